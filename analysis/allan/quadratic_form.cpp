@@ -11,6 +11,7 @@
 
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/statistics/power_law.hpp"
+#include "engine/core/dense.hpp"
 
 namespace ringlock::allan {
 namespace {
@@ -248,20 +249,19 @@ WeightedSquares distribution_of(Estimator estimator, int alpha, std::int64_t m, 
     const Matrix c = covariance(alpha, m, points);
     const std::int64_t base_span = means ? 3 * m : t.differences * m + 1;
 
-    Eigen::SelfAdjointEigenSolver<Matrix> form(form_of(t, m, points));
-    const double largest = form.eigenvalues().tail(1)(0);
+    const dense::SymmetricEigen form = dense::symmetric_eigen(form_of(t, m, points));
+    const double largest = form.values.tail(1)(0);
     std::vector<std::int64_t> kept;
     for (std::int64_t i = 0; i < points; ++i) {
-        if (form.eigenvalues()(i) > 1e-10 * largest) kept.push_back(i);
+        if (form.values(i) > 1e-10 * largest) kept.push_back(i);
     }
     Matrix root(static_cast<std::int64_t>(kept.size()), points);
     for (std::size_t r = 0; r < kept.size(); ++r) {
         root.row(static_cast<std::int64_t>(r)) =
-            std::sqrt(form.eigenvalues()(kept[r])) * form.eigenvectors().col(kept[r]).transpose();
+            std::sqrt(form.values(kept[r])) * form.vectors.col(kept[r]).transpose();
     }
     const Matrix weights_of = root * c * root.transpose();
-    const Eigen::VectorXd eigenvalues =
-        Eigen::SelfAdjointEigenSolver<Matrix>(weights_of, Eigen::EigenvaluesOnly).eigenvalues();
+    const Eigen::VectorXd eigenvalues = dense::symmetric_eigenvalues(weights_of);
 
     // The variance of a plain term, of which the mean square is the true variance.
     const Row term = term_row(t.differences, means, m, base_span);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/core/dense.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
@@ -73,13 +74,13 @@ GaussianCopula::GaussianCopula(std::span<const Factor> factors, std::span<const 
         given(i, j) = given(j, i) = 1;
         matrix(i, j) = matrix(j, i) = normal_score_correlation(c.value, of);
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(matrix);
+    const dense::SymmetricEigen eigen = dense::symmetric_eigen(matrix);
     const Eigen::LLT<Eigen::MatrixXd> cholesky(matrix);
-    if (eigen.eigenvalues()[0] < least_eigenvalue || cholesky.info() != Eigen::Success) {
+    if (eigen.values[0] < least_eigenvalue || cholesky.info() != Eigen::Success) {
         throw InputError(
             fmt::format("the correlations of {} contradict each other: no factors can have them all (the "
                         "smallest eigenvalue of their matrix is {:.3g} and must be above 0); bring them nearer to 0",
-                        contradicting(factors, eigen.eigenvectors().col(0)), eigen.eigenvalues()[0]));
+                        contradicting(factors, eigen.vectors.col(0)), eigen.values[0]));
     }
     factor_ = cholesky.matrixL();
     for (Eigen::Index i = 0; i < n; ++i) {

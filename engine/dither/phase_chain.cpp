@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/core/dense.hpp"
+
 namespace ringlock::dither {
 
 namespace {
@@ -18,10 +20,10 @@ template <class Recursion>
 std::vector<DriveLevel> gauss(int count, const Recursion& recursion) {
     Eigen::MatrixXd jacobi = Eigen::MatrixXd::Zero(count, count);
     for (int i = 1; i < count; ++i) jacobi(i, i - 1) = jacobi(i - 1, i) = recursion(static_cast<double>(i));
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(jacobi);
+    const dense::SymmetricEigen jacobi_eigen = dense::symmetric_eigen(jacobi);
     std::vector<DriveLevel> levels;
     for (int i = 0; i < count; ++i) {
-        levels.push_back({solver.eigenvalues()(i), solver.eigenvectors()(0, i) * solver.eigenvectors()(0, i)});
+        levels.push_back({jacobi_eigen.values(i), jacobi_eigen.vectors(0, i) * jacobi_eigen.vectors(0, i)});
     }
     return levels;
 }

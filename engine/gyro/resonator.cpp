@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::gyro {
@@ -65,8 +66,8 @@ Resonator::Resonator(const DriveNoise& noise) : noise_(noise), damping_(0.5 / no
         loop_gain_ = crossing * 0.5 / noise.frequency_hz;
     }
     const Matrix4d a = advance();
-    decay_ = a.topLeftCorner<3, 3>().eigenvalues().cwiseAbs().maxCoeff();
-    if (loop_gain_ == 0.0) decay_ = step_.eigenvalues().cwiseAbs().maxCoeff();
+    decay_ = dense::spectral_radius(a.topLeftCorner<3, 3>());
+    if (loop_gain_ == 0.0) decay_ = dense::spectral_radius(step_);
     if (noise.form == NoiseForm::sinusoidal) {
         // The product of the two sinusoids is a pair of lines at w +- m; each is answered by the resonator.
         const std::complex<double> i(0.0, 1.0);

@@ -12,6 +12,18 @@ double product(const std::vector<double>& a, const std::vector<double>& b, const
     return sum;
 }
 
+std::vector<const std::vector<double>*> pointers(const std::vector<std::vector<double>>& columns) {
+    std::vector<const std::vector<double>*> out;
+    for (const auto& column : columns) out.push_back(&column);
+    return out;
+}
+
+/// Scales a matrix of products to a unit diagonal; `over` becomes one over the length of each column.
+Eigen::MatrixXd scaled(const Eigen::MatrixXd& normal, Eigen::VectorXd& over) {
+    over = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    return over.asDiagonal() * normal * over.asDiagonal();
+}
+
 }  // namespace
 
 Eigen::MatrixXd products(const std::vector<const std::vector<double>*>& columns, const Rows& rows) {
@@ -35,12 +47,8 @@ Eigen::VectorXd products(const std::vector<const std::vector<double>*>& columns,
     return sums;
 }
 
-ColumnRegression::ColumnRegression(const std::vector<std::vector<double>>& columns, const Rows& rows) : rows_(rows) {
-    for (const auto& column : columns) columns_.push_back(&column);
-    const Eigen::MatrixXd normal = products(columns_, rows_);
-    over_ = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    solver_.compute(over_.asDiagonal() * normal * over_.asDiagonal());
-}
+ColumnRegression::ColumnRegression(const std::vector<std::vector<double>>& columns, const Rows& rows)
+    : columns_(pointers(columns)), rows_(rows), solver_(scaled(products(columns_, rows_), over_)) {}
 
 Eigen::VectorXd ColumnRegression::of(const std::vector<double>& values) const {
     const Eigen::VectorXd right = over_.asDiagonal() * products(columns_, values, rows_);
@@ -57,7 +65,7 @@ std::vector<double> ColumnRegression::freed(std::vector<double> values) const {
 }
 
 Eigen::MatrixXd ColumnRegression::covariance() const {
-    return over_.asDiagonal() * solver_.pseudoInverse() * over_.asDiagonal();
+    return over_.asDiagonal() * solver_.pseudo_inverse() * over_.asDiagonal();
 }
 
 }  // namespace ringlock::closure

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "analysis/closure/types.hpp"
+#include "engine/core/dense.hpp"
 
 namespace ringlock::closure {
 
@@ -27,7 +28,7 @@ class ColumnRegression {
     std::vector<const std::vector<double>*> columns_;
     const Rows& rows_;
     Eigen::VectorXd over_;  ///< one over the length of each column
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver_;
+    dense::MinimumNorm solver_;
 };
 
 }  // namespace ringlock::closure

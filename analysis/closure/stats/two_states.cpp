@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/closure/options.hpp"
+#include "engine/core/dense.hpp"
 
 namespace ringlock::closure {
 
@@ -111,7 +112,7 @@ class Chain {
             h(1, 1) += 2.0 * next_(k) * both_[static_cast<std::size_t>(k)];
         }
         h(1, 0) = h(0, 1);
-        const Eigen::Vector2d levels = h.completeOrthogonalDecomposition().solve(b);
+        const Eigen::Vector2d levels = dense::MinimumNorm(h).solve(Eigen::VectorXd(b));
         states.rate = levels(0);
         states.step = levels(1);
     }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <deque>
 
+#include "engine/core/dense.hpp"
+
 namespace ringlock::noise {
 namespace {
 
@@ -30,7 +32,7 @@ class Acceleration {
         if (columns == 0) return image;
         Eigen::MatrixXd differences(rest.size(), columns);
         for (Eigen::Index k = 0; k < columns; ++k) differences.col(k) = rests_[at(k + 1)] - rests_[at(k)];
-        const Eigen::VectorXd share = differences.colPivHouseholderQr().solve(rest);
+        const Eigen::VectorXd share = dense::least_squares(differences, rest);
         if (!share.allFinite() || share.norm() > 30.0) {
             clear();
             return image;

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "analysis/noise/model/lost_information.hpp"
+#include "engine/core/dense.hpp"
 
 namespace ringlock::noise {
 namespace {
@@ -233,7 +234,8 @@ Maximum Likelihood::maximise(const Model& model, const Parameters* start, std::s
         const Eigen::VectorXd scale = h.diagonal().cwiseSqrt().cwiseInverse();
         Eigen::MatrixXd scaled = scale.asDiagonal() * h * scale.asDiagonal();
         scaled.diagonal().array() += 1e-12;
-        const Eigen::VectorXd step = -(scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * g)).eval();
+        const Eigen::VectorXd step =
+            -(scale.asDiagonal() * dense::solve_symmetric(scaled, scale.asDiagonal() * g)).eval();
         if (-0.5 * g.dot(step) < enough) break;
         double length = 1.0;
         bool moved = false;
@@ -281,7 +283,7 @@ Maximum Likelihood::maximise(const Model& model, const Parameters* start, std::s
                              scale(a) * scale(b);
         }
     }
-    const Eigen::MatrixXd inverse = relative.completeOrthogonalDecomposition().pseudoInverse();
+    const Eigen::MatrixXd inverse = dense::MinimumNorm(relative).pseudo_inverse();
     for (Eigen::Index a = 0; a < count; ++a) {
         for (Eigen::Index b = 0; b < count; ++b) {
             out.covariance[static_cast<std::size_t>(inside[static_cast<std::size_t>(a)])]

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "engine/core/dense.hpp"
+
 namespace ringlock::noise {
 namespace {
 
@@ -37,7 +39,7 @@ double LostInformation::inflation(std::span<const std::size_t> terms, std::size_
     const Eigen::Index k = at - known.begin();
     const auto variance = [&](const std::array<Parameters, parameter_count>& information) {
         const Eigen::MatrixXd matrix = information_on(information, complete, known);
-        return matrix.completeOrthogonalDecomposition().pseudoInverse()(k, k);
+        return dense::MinimumNorm(matrix).pseudo_inverse()(k, k);
     };
     const double ratio = variance(present) / variance(complete);
     const double clamped = std::isfinite(ratio) ? std::clamp(ratio, 1.0, most) : most;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "engine/core/dense.hpp"
+
 namespace ringlock::noise {
 namespace {
 
@@ -36,8 +38,7 @@ std::vector<Score> scores(const Likelihood& likelihood, const Maximum& five, dou
         const double size = terms.col(i).norm();
         if (size > 0.0) terms.col(i) /= size;
     }
-    const auto orthogonal = terms.colPivHouseholderQr();
-    const Eigen::MatrixXd base = orthogonal.householderQ() * Eigen::MatrixXd::Identity(rows, orthogonal.rank());
+    const Eigen::MatrixXd base = dense::orthonormal_basis_of_rank(terms);
 
     std::vector<Score> out;
     const LogTimes range = log_times(likelihood.samples());

@@ -7,6 +7,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/column_regression.hpp"
+#include "engine/core/dense.hpp"
 
 namespace ringlock::closure {
 
@@ -210,22 +211,21 @@ SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series
     const auto k = static_cast<Eigen::Index>(own);
     const Eigen::MatrixXd base = normal.topLeftCorner(k, k);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt();
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(base);
+    const dense::MinimumNorm solver(base);
     const Eigen::MatrixXd cross = normal.bottomLeftCorner(m - k, k);
-    Eigen::MatrixXd freed = normal.bottomRightCorner(m - k, m - k) - cross * solver.solve(cross.transpose());
-    const Eigen::VectorXd target = right.tail(m - k) - cross * solver.solve(right.head(k));
+    Eigen::MatrixXd freed =
+        normal.bottomRightCorner(m - k, m - k) - cross * solver.solve(Eigen::MatrixXd(cross.transpose()));
+    const Eigen::VectorXd target = right.tail(m - k) - cross * solver.solve(Eigen::VectorXd(right.head(k)));
     const Eigen::VectorXd s = scale.tail(m - k);
     freed = s.cwiseInverse().asDiagonal() * freed * s.cwiseInverse().asDiagonal();
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> rest;
-    rest.setThreshold(options.samples.fit.told_apart);
-    rest.compute(freed);
+    const dense::MinimumNorm rest(freed, options.samples.fit.told_apart);
     const Eigen::VectorXd scaled = s.cwiseInverse().asDiagonal() * target;
     const Eigen::VectorXd solution = rest.solve(scaled);
     Score score;
     score.chi2 = std::max(0.0, scaled.dot(solution));
     score.rank = freed.diagonal().maxCoeff() > options.samples.fit.told_apart ? static_cast<int>(rest.rank()) : 0;
     for (Eigen::Index i = 0; i < m - k; ++i) score.value.push_back(solution(i) / s(i));
-    score.covariance = s.cwiseInverse().asDiagonal() * rest.pseudoInverse() * s.cwiseInverse().asDiagonal();
+    score.covariance = s.cwiseInverse().asDiagonal() * rest.pseudo_inverse() * s.cwiseInverse().asDiagonal();
     return score;
 }
 

@@ -13,6 +13,7 @@
 #include "analysis/closure/samples/fit/simplex.hpp"
 #include "analysis/closure/samples/model/lanes.hpp"
 #include "analysis/closure/stats/column_regression.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 
@@ -75,7 +76,7 @@ Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
     const Eigen::VectorXd over = information.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
     Eigen::MatrixXd scaled = over.asDiagonal() * information * over.asDiagonal();
     scaled.diagonal().array() += 1e-9;
-    const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    const Eigen::MatrixXd inverse = dense::inverse_of_symmetric(scaled);
     return over.asDiagonal() * inverse * over.asDiagonal();
 }
 
@@ -296,7 +297,7 @@ void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std:
             Eigen::MatrixXd damped = now.information;
             damped.diagonal() *= 1.0 + damping;
             damped.diagonal().array() += 1e-6;
-            Eigen::VectorXd step = damped.ldlt().solve(-now.gradient);
+            Eigen::VectorXd step = dense::solve_symmetric(damped, -now.gradient);
             if (!step.allFinite()) break;
             const double most = step.cwiseAbs().maxCoeff();
             if (most > longest) step *= longest / most;

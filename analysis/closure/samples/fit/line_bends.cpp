@@ -7,6 +7,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -103,7 +104,7 @@ class Bending {
                 right += (std::conj(amplitude) * turned[j]).imag() * off;
             }
         }
-        found.step = normal.completeOrthogonalDecomposition().solve(right);
+        found.step = dense::MinimumNorm(normal).solve(right);
         return found;
     }
     void improve(std::size_t pieces) {

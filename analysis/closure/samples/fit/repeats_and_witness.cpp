@@ -9,6 +9,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/stats/p_values.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -255,7 +256,7 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
     flush();
     normal = normal.selfadjointView<Eigen::Lower>();
     normal.diagonal() *= 1.0 + 1e-9;
-    const Eigen::VectorXd response = normal.ldlt().solve(right);
+    const Eigen::VectorXd response = dense::solve_symmetric(normal, right);
     WitnessMotion motion;
     motion.increments.assign(n, 0.0);
     for (std::size_t i = 0; i < n; ++i) {

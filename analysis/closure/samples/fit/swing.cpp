@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "analysis/closure/samples/fit/line_search.hpp"
+#include "engine/core/dense.hpp"
 
 namespace ringlock::closure {
 
@@ -26,7 +27,7 @@ Swing swing_of_variance(const SampleFit& fit, double hz) {
             slope += 0.5 * (ratio - 1.0) * x;
             curvature += 0.5 * x * x.transpose();
         }
-        const Eigen::Vector3d step = curvature.ldlt().solve(slope);
+        const Eigen::Vector3d step = dense::solve_symmetric(curvature, slope);
         mean += step(0);
         swing.cos += step(1);
         swing.sin += step(2);

@@ -8,6 +8,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/model/lanes.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 #include "engine/random/stream.hpp"
@@ -58,8 +59,8 @@ Root root_of(const SampleStates::Matrix& covariance, int count) {
     for (int i = 0; i < count; ++i) {
         for (int j = 0; j < count; ++j) matrix(i, j) = covariance[i][j];
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(matrix);
-    return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    const dense::SymmetricEigen root = dense::symmetric_eigen(matrix);
+    return root.vectors * root.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
 }
 
 Eigen::VectorXd normals(int count, random::NormalStream& normal) {

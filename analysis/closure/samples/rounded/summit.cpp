@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "engine/core/dense.hpp"
+
 namespace ringlock::closure {
 
 namespace {
@@ -169,12 +171,12 @@ double Climb::climb_noises() {
             bend(i, j) = bend(j, i) = std::clamp(cross, -most_cross, most_cross);
         }
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(bend);
+    const dense::SymmetricEigen axes = dense::symmetric_eigen(bend);
     Eigen::VectorXd lengths = Eigen::VectorXd::Zero(m);
     Eigen::VectorXd variance = Eigen::VectorXd::Zero(m);  // lengths^2
     for (Eigen::Index j = 0; j < m; ++j) {
-        const auto along = axes.eigenvectors().col(j);
-        const double bends = axes.eigenvalues()(j);
+        const auto along = axes.vectors.col(j);
+        const double bends = axes.values(j);
         // Where the curvature is not that of a maximum, the step is still uphill.
         const double stiff = std::max(std::abs(bends), softest);
         lengths += std::clamp(slope.dot(along) / stiff, -most, most) * along;
@@ -215,9 +217,9 @@ double Climb::climb_columns() {
     const Eigen::VectorXd scale = known.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * known * scale.cwiseInverse().asDiagonal();
     // Independent directions nearest to the columns: steps hide the amplitude of a line, and not the mean rate.
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(correlation);
-    const Eigen::MatrixXd root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-                                 axes.eigenvectors().transpose();
+    const dense::SymmetricEigen axes = dense::symmetric_eigen(correlation);
+    const Eigen::MatrixXd root =
+        axes.vectors * axes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * axes.vectors.transpose();
     struct Along {
         Eigen::VectorXd direction;
         double length;

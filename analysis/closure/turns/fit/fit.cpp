@@ -7,6 +7,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/model/side_by_side.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
@@ -260,7 +261,7 @@ void TurnFit::fit_nuisances() {
     for (std::size_t k = 0; k < nuisance_.size(); ++k) {
         x.col(static_cast<Eigen::Index>(k)) = counted(whitening, prediction_.frame, columns_[k].of);
     }
-    const Eigen::VectorXd step = x.householderQr().solve(y);
+    const Eigen::VectorXd step = dense::least_squares(x, y);
     for (std::size_t k = 0; k < nuisance_.size(); ++k) nuisance_[k] += step(static_cast<Eigen::Index>(k));
     set_rest(prediction_);
 }
@@ -342,12 +343,14 @@ bool TurnFit::go_down(const Equations& equations, const Whitening* guessed) {
     constexpr double gained = 1e-3;  // of chi-squared: another step would gain less than is useful
     constexpr int parts = 4;
     constexpr int trials = 12;
-    const auto& [normal, right, scale] = equations;
-    const Eigen::VectorXd whole = normal.ldlt().solve(right);
+    const Eigen::MatrixXd& normal = equations.normal;
+    const Eigen::VectorXd& right = equations.right;
+    const Eigen::VectorXd whole = dense::solve_symmetric(normal, right);
     const auto step = [&](int trial) -> Eigen::VectorXd {
         if (trial < parts) return std::exp2(-trial) * whole;
         const double damping = 1e-3 * std::pow(10.0, trial - parts);
-        return (normal + damping * Eigen::MatrixXd::Identity(normal.rows(), normal.cols())).ldlt().solve(right);
+        return dense::solve_symmetric(normal + damping * Eigen::MatrixXd::Identity(normal.rows(), normal.cols()),
+                                      right);
     };
     const auto value = [&](const TurnModel::Prediction& prediction) {
         return guessed != nullptr ? squares_left(*guessed) : objective_at(prediction);
@@ -358,7 +361,7 @@ bool TurnFit::go_down(const Equations& equations, const Whitening* guessed) {
     for (int trial = 0; trial < trials; ++trial) {
         parameters_ = from;
         nuisance_ = nuisance_from;
-        take(step(trial).cwiseQuotient(scale));
+        take(step(trial).cwiseQuotient(equations.scale));
         try {
             TurnModel::Prediction prediction = model_->predict(parameters_);
             set_rest(prediction);
@@ -573,9 +576,7 @@ const Eigen::MatrixXd& TurnFit::basis() const {
     const std::lock_guard lock(making_basis_);
     if (has_basis_) return basis_;
     Eigen::VectorXd scale;
-    Eigen::MatrixXd own = whitened_columns(scale);
-    const Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(own);  // in place
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(qr.rows(), scale.size());
+    basis_ = dense::orthonormal_basis(whitened_columns(scale));
     has_basis_ = true;
     return basis_;
 }

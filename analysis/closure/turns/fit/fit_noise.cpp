@@ -13,6 +13,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 #include "analysis/closure/turns/model/side_by_side.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::closure {
@@ -365,7 +366,7 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
     }
     const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * matrix * scale.cwiseInverse().asDiagonal();
-    const Eigen::MatrixXd inverse = scaled.completeOrthogonalDecomposition().pseudoInverse();
+    const Eigen::MatrixXd inverse = dense::MinimumNorm(scaled).pseudo_inverse();
     for (std::size_t k = 0; k < turned.size(); ++k) {
         const auto index = static_cast<Eigen::Index>(k);
         const double value = *turned[k].value;

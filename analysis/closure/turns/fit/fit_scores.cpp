@@ -6,6 +6,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 #include "analysis/closure/turns/model/side_by_side.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -46,7 +47,7 @@ Eigen::MatrixXd TurnFit::information(Eigen::VectorXd& scale) const {
         normal.row(k) = normal.col(k).transpose();
     }
     add_priors(scale, normal, nullptr);
-    if (normal.ldlt().isPositive()) return normal;
+    if (dense::is_positive(normal)) return normal;
     normal = squares;  // at the end of a range, or where no row is informative
     add_priors(scale, normal, nullptr);
     return normal;
@@ -62,7 +63,7 @@ std::vector<Estimate> TurnFit::estimate() const {
     ready();
     Eigen::VectorXd scale;
     const Eigen::MatrixXd normal = information(scale);
-    const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+    const Eigen::MatrixXd covariance = dense::inverse_of_symmetric(normal);
     TurnParameters found = parameters_;
     std::vector<Estimate> estimates;
     for (std::size_t k = nuisances(); k < columns_.size(); ++k) {
@@ -123,8 +124,7 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, c
         const Eigen::MatrixXd x = counted(whitening, frame, own + regressors.size(), column_of, scale);
         const Eigen::MatrixXd normal = x.transpose() * x;
         const Eigen::VectorXd right = x.transpose() * y;
-        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
-        const Eigen::VectorXd value = decomposition.solve(right).cwiseQuotient(scale);
+        const Eigen::VectorXd value = dense::MinimumNorm(normal).solve(right).cwiseQuotient(scale);
         for (std::size_t k = 0; k < own + regressors.size(); ++k) {
             column_of(k).take(value(static_cast<Eigen::Index>(k)), rest, frame);
         }
@@ -168,8 +168,8 @@ TurnFit::Score TurnFit::score_whitened(std::size_t count,
 
 TurnFit::Score TurnFit::score_of(const Products& products) {
     Score score;
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(products.squares);
-    score.covariance = decomposition.pseudoInverse();
+    const dense::MinimumNorm decomposition(products.squares);
+    score.covariance = decomposition.pseudo_inverse();
     score.value = score.covariance * products.right;
     score.chi2 = products.right.dot(score.value);
     score.rank = static_cast<int>(decomposition.rank());

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/core/dense.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
@@ -191,7 +192,7 @@ TurnKicks::TurnKicks(const gyro::Setup& setup) {
                 values(j, 0) = halves[2 * parity][j] + gain;
                 values(j, 1) = halves[2 * parity + 1][j] - gain;
             }
-            const Eigen::MatrixXd c = basis.colPivHouseholderQr().solve(values);
+            const Eigen::MatrixXd c = dense::least_squares(basis, values);
             for (std::size_t side = 0; side < 2; ++side) {
                 for (std::size_t k = 0; k <= harmonics; ++k) {
                     sides[side][k] = Complex(c(k, side), k > 0 ? -c(harmonics + k, side) : 0.0);
@@ -306,7 +307,7 @@ struct Nodes {
             at[static_cast<std::size_t>(j)] = x;
             for (Eigen::Index k = 0; k < count; ++k) powers(j, k) = std::pow(x, static_cast<double>(k));
         }
-        weights = powers.inverse();
+        weights = dense::inverse(powers);
     }
     double weight(std::size_t power, std::size_t node) const {
         return weights(static_cast<Eigen::Index>(power), static_cast<Eigen::Index>(node));

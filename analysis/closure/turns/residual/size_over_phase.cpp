@@ -12,6 +12,7 @@
 #include "analysis/closure/stats/whiteness.hpp"
 #include "analysis/closure/turns/model/kicks.hpp"
 #include "analysis/closure/turns/model/phase_table.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -104,13 +105,13 @@ ResidualTest size_over_phase(const TurnFit& fit) {
         right += row;
         covariance += row * row.transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+    const dense::SymmetricEigen axes = dense::symmetric_eigen(covariance);
     double folded = 0.0;
     int freedom = 0;
     for (Eigen::Index k = 0; k < columns; ++k) {
-        if (axes.eigenvalues()(k) < options.turns.residual.least_direction * axes.eigenvalues().maxCoeff()) continue;
-        const double along = axes.eigenvectors().col(k).dot(right);
-        folded += along * along / axes.eigenvalues()(k);
+        if (axes.values(k) < options.turns.residual.least_direction * axes.values.maxCoeff()) continue;
+        const double along = axes.vectors.col(k).dot(right);
+        folded += along * along / axes.values(k);
         ++freedom;
     }
     return {Where::phase, "size of the residual over the turn's phase", chi2_tail(folded, freedom), ""};

@@ -16,6 +16,7 @@
 #include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/closure/turns/residual/jumps.hpp"
 #include "analysis/closure/turns/residual/size_over_phase.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -109,7 +110,7 @@ void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
     const double sd = fit.model().series().radius_sd_rad;
     Eigen::MatrixXd covariance = score.covariance;
     covariance.diagonal().head(2).array() += 2.0 * sd * sd / counted;
-    score.chi2 = score.value.dot(covariance.ldlt().solve(score.value));
+    score.chi2 = score.value.dot(dense::solve_symmetric(covariance, score.value));
 }
 
 void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {

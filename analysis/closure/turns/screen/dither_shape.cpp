@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "analysis/closure/options.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -43,7 +44,7 @@ std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& p
             normal += row * row.transpose();
             right += row * (fit.model().phase_rad()[i] - prediction.phase_rad[i]);
         }
-        const Eigen::Vector3d found = normal.ldlt().solve(right);
+        const Eigen::Vector3d found = dense::solve_symmetric(normal, right);
         std::fill(rate.begin() + static_cast<std::ptrdiff_t>(begin), rate.begin() + static_cast<std::ptrdiff_t>(end),
                   found(0));
     }
@@ -176,7 +177,7 @@ Eigen::VectorXd take_phase(std::vector<double>& series, const std::vector<std::u
         right += row * series[i];
     }
     normal.diagonal().array() += 1e-9 * normal.trace();
-    const Eigen::VectorXd c = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+    const Eigen::VectorXd c = dense::solve_symmetric(normal, right);
     for (std::size_t i = 0; i < n; ++i) {
         if (!valid[i]) continue;
         fill(i);

@@ -6,6 +6,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/turns/screen/miscounts.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -150,7 +151,7 @@ RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
             right += x * y;
             squares += y * y;
         }
-        const Eigen::Matrix<double, 5, 5> inverse = normal.inverse();
+        const Eigen::Matrix<double, 5, 5> inverse = dense::inverse(normal);
         const Eigen::Matrix<double, 5, 1> step = inverse * right;
         const double variance = std::max((squares - step.dot(right)) / (count - 5.0), 1e-24);
         if (pass == 0) {
