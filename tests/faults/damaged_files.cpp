@@ -65,7 +65,7 @@ class DamagedFiles : public DamageTest {
     }
 };
 
-TEST_F(DamagedFiles, SomeOfEveryKindAreAnswered) { damage(12, 6, 1); }
+TEST_F(DamagedFiles, SomeOfEveryKindAreAnswered) { damage(6, 3, 1); }
 
 class LongDamagedFiles : public DamagedFiles {};
 
