@@ -35,6 +35,7 @@ std::string key_of(std::size_t variation, std::string_view name) {
 /// Why a key cannot vary; empty where it can.
 std::string why_not(const std::string& path) {
     const scenario::Key* key = scenario::find_key(path);
+    if (path == "device") return "names a device; a design varies numbers";
     if (key == nullptr) return "is not a key of a scenario; `ringlock run --print-schema` prints all of them";
     const bool number = key->type == scenario::Type::real || key->type == scenario::Type::integer;
     if (!number) return fmt::format("is {}; a design varies numbers", scenario::allowed_text(*key));

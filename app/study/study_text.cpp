@@ -165,7 +165,7 @@ void add_scale_factor(const study::Study& study, const study::Summary& summary, 
     report::Table slopes({{"arm", report::Align::left},
                           {"scale factor error [ppm]", report::Align::right},
                           {"repeatability [ppm]", report::Align::right},
-                          {"of it noise", report::Align::right},
+                          {"of which noise", report::Align::right},
                           {"beyond noise [ppm]", report::Align::right},
                           {"bias [deg/h]", report::Align::right}});
     report::Table deviations({{"arm", report::Align::left},

@@ -22,7 +22,8 @@ std::vector<Section> base_sections() {
         {"dither",
          "The mechanical dither, a sinusoid before noise and effects.",
          {
-             key(RINGLOCK_KEY(dither, frequency_hz), between(1.0, 1e5, "mechanical dither runs at some hundred Hz"),
+             key(RINGLOCK_KEY(dither, frequency_hz),
+                 between(1.0, 1e5, "mechanical dithers run at some 100 to 1000 Hz; the range leaves room for models"),
                  "Frequency; the default is 783.4 rad/s."),
              key(RINGLOCK_KEY(dither, peak_rate_deg_s), above(0.0, 1e4, "without dither there are no turns to follow"),
                  "Omega_D: peak rate of the case against the cavity."),
@@ -40,7 +41,7 @@ std::vector<Section> base_sections() {
                  "turns: the angles of the turns are independent, which no drive can make; drive: "
                  "the force that drives the dithered body, a resonator, is noisy (docs/noise-injection.md)."),
              key(RINGLOCK_KEY(noise_injection, turn_phase_rms_rad),
-                 between(0.0, 1e4, "far more than it takes to randomise the turns"),
+                 between(0.0, 1e4, "a few rad randomise the phases of the turns"),
                  "Rms of the angle at the turns about its mean, in optical phase, stationary, behind resonator "
                  "and amplitude loop. Independent from turn to turn, 3 rad randomise the turns fully."),
              key(RINGLOCK_KEY(noise_injection, drive_noise_relative), between(0.0, 100.0, "the drive keeps its sense"),
@@ -126,14 +127,16 @@ std::vector<Section> base_sections() {
          {
              key(RINGLOCK_KEY(environment, temperature_ramp_k_per_h), between(-1000.0, 1000.0, "a gyro warming up"),
                  "Steady change of the temperature."),
-             key(RINGLOCK_KEY(environment, temperature_swing_k), between(0.0, 100.0, "a day in the desert"),
+             key(RINGLOCK_KEY(environment, temperature_swing_k),
+                 between(0.0, 100.0, "more than the temperature swings in any day"),
                  "Amplitude of the periodic change."),
              key(RINGLOCK_KEY(environment, temperature_period_s), between(1.0, 1e9, "slower than the dither"),
                  "Period of that; the default is a day."),
              key(RINGLOCK_KEY(environment, profile_time_s), between(-1e9, 1e9, "30 years"),
                  "Times of a profile of the temperature, from the start of the run, "
                  "that takes the place of ramp and swing: linear between its points, constant beyond them."),
-             key(RINGLOCK_KEY(environment, profile_temperature_k), between(-1000.0, 1000.0, "a gyro, not a furnace"),
+             key(RINGLOCK_KEY(environment, profile_temperature_k),
+                 between(-1000.0, 1000.0, "no laser gyro works beyond it"),
                  "Temperatures at these times; only their difference from that at the start counts."),
          }},
         {"ensemble",
@@ -242,7 +245,7 @@ std::vector<Section> base_sections() {
                  "reference: a measured dither angle is subtracted; fir: a low-pass filter of linear phase; "
                  "notch: an adaptive canceller of the dither's frequency; reference+fir: both."),
              key(RINGLOCK_KEY(reader, reference_gain_error_relative),
-                 between(-0.5, 0.5, "a reference with a larger error is of no use"),
+                 between(-0.5, 0.5, "a larger error of the gain leaves more than half of the dither"),
                  "Error of the measured dither angle, relative."),
              key(RINGLOCK_KEY(reader, reference_delay_s), between(0.0, 1e-2, "a quarter of a slow dither's cycle"),
                  "Delay of the measured dither angle."),
@@ -251,12 +254,12 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(reader, reference_learning_s), between(0.0, 1e6, "a record is shorter"),
                  "Time constant with which gain and delay of the reference are estimated. 0: "
                  "they are taken as 1 and 0."),
-             key(RINGLOCK_KEY(reader, fir_order), zero_or_whole(2, 100'000, "a longer filter forgets nothing"),
+             key(RINGLOCK_KEY(reader, fir_order), zero_or_whole(2, 100'000, "a longer filter would span many seconds"),
                  "Order of the low-pass filter, its taps less one; even. It delays by half of it. 0: "
                  "four cycles of the dither."),
              key(RINGLOCK_KEY(reader, fir_cutoff_hz), zero_or(1e-3, 1e6, "the latching rate is at most 1e6 Hz"),
                  "Frequency at which the low-pass filter's response is about one half. 0: a quarter of the dither's."),
-             key(RINGLOCK_KEY(reader, notch_bandwidth_hz), above(0.0, 1e5, "a notch has a width"),
+             key(RINGLOCK_KEY(reader, notch_bandwidth_hz), above(0.0, 1e5, "the width of a notch is positive"),
                  "Bandwidth of the adaptive canceller between the points of half the power."),
          }},
         {"arms",

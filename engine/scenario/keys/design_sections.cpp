@@ -88,9 +88,9 @@ std::vector<Section> design_sections() {
          "Stopping rule of the lot: gyros are added at 16, 32, 64, ... until every requested precision is reached. "
          "ensemble.gyros is not used then.",
          {
-             key(RINGLOCK_KEY(stop, arw_relative), zero_or(1e-4, 1.0, "0: not asked for"),
+             key(RINGLOCK_KEY(stop, arw_relative), zero_or(1e-4, 1.0, "0 switches this limit off"),
                  "Half width of the 95 % interval of every arm's mean random walk (mean of its logarithm), relative."),
-             key(RINGLOCK_KEY(stop, yield_absolute), zero_or(1e-4, 0.49, "0: not asked for"),
+             key(RINGLOCK_KEY(stop, yield_absolute), zero_or(1e-4, 0.49, "0 switches this limit off"),
                  "Half width of the 95 % interval of every arm's yield: 0.02 is +-2 %. Needs a [specification]."),
              key(RINGLOCK_KEY(stop, most_gyros), between<std::int64_t>(1, 10'000'000, "each one's results are kept"),
                  "The lot ends at this number in any case; in a design, at every point."),
