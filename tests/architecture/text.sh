@@ -39,6 +39,14 @@ check() {
 check "path of one machine" '(^|[^[:alnum:]_.}~/])/((hom[e]|User[s]|roo[t])/|(wor[k]|workspac[e])($|[^[:alnum:]_]))'
 check "open end; write it into the changelog or do it" '(^|[^[:alnum:]_])(TOD[O]|FIXM[E])($|[^[:alnum:]_])'
 
+# `for (x : make().parts.front().of)` goes over the parts of an object that is gone: the loop keeps the last temporary
+# of the expression only.
+if git grep --untracked -nE \
+    'for \([^;]* : ([a-z_]+::)*[a-z_]+\(.*\)(\.[a-z_]+)*(->|\.(front|back|at|value|items|elements)\(|\[)' \
+    -- '*.cpp' '*.hpp'; then
+    echo "^ may go over a part of a temporary; give the object a name"
+    bad=1
+fi
 # Files that somebody names are opened behind store::guarded() alone: by File::open(), which takes nothing but its
 # permission, and by the reader of MAT-files within it.
 if git grep --untracked -nE 'H5Fope[n]|Mat_Ope[n]|archive_read_ope[n]' -- engine analysis app ':!engine/store' \

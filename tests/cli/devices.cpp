@@ -34,7 +34,9 @@ TEST_F(DevicesCommand, ListsEachWithItsFigures) {
 }
 
 TEST_F(DevicesCommand, EachRunsAsAScenario) {
-    for (const json& device : json::parse(run({"devices", "--json"}).out)["devices"]) {
+    const json all = json::parse(run({"devices", "--json"}).out)["devices"];
+    ASSERT_FALSE(all.empty());
+    for (const json& device : all) {
         const std::string name = device["name"];
         write(name + ".toml", "device = \"" + name + "\"\n[ensemble]\ngyros = 2\nduration_s = 4.0\n");
         const Outcome r = run({"run", name + ".toml", "-o", name + ".h5", "--json"});

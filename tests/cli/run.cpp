@@ -316,7 +316,9 @@ TEST_F(RunCommand, SweepsOfThreeRatesShowTheLineThroughThem) {
                "[arms]\nnames = [\"uncompensated\", \"noise_injected\", \"noise_injected+compensated\"]\n";
     };
     write("two.toml", sweep(2));
-    for (const auto& [name, arm] : json::parse(run({"run", "two.toml", "--json"}).out)["arms"].items()) {
+    const json of_two = json::parse(run({"run", "two.toml", "--json"}).out)["arms"];
+    ASSERT_FALSE(of_two.empty());
+    for (const auto& [name, arm] : of_two.items()) {
         for (const char* field : fields) EXPECT_TRUE(arm.contains(field) && arm[field].is_null()) << name << field;
     }
     EXPECT_THAT(run({"analyze", "two.h5"}).out, testing::Not(HasSubstr("Straight lines")));
@@ -437,7 +439,9 @@ TEST_F(RunCommand, AnalyzeTakesDeviationsAtTimesAskedForFromAngleRecords) {
             const Outcome one = run({"allan", "out.h5", "--column", column, "--kind", "phase", "--unit", "arcsec",
                                      "--rate", "1.00074812967581", "--tau", "1,3,6,10", "--json"});
             ASSERT_EQ(one.status, 0) << one.err;
-            for (const json& point : json::parse(one.out)["deviations"]["oadev"]) {
+            const json points = json::parse(one.out)["deviations"]["oadev"];
+            ASSERT_FALSE(points.empty());
+            for (const json& point : points) {
                 variance[point["m"]] += std::pow(point["dev"].get<double>(), 2) / 4.0;
             }
         }

@@ -189,7 +189,9 @@ TEST(ReadStudies, AProfileIsThatOfTheOutputs) {
     s.input.profile_rate_deg_h = {0.0, 1000.0};
     s.reader.latch_hz = 1000.0;
     s.reader.stripping = reader::Stripping::reference_fir;
-    for (const GyroStatistics& gyro : run_checked(s).arms.front().gyros) EXPECT_NEAR(gyro.rate_error_deg_h, 0.0, 1e-4);
+    const Study study = run_checked(s);
+    ASSERT_FALSE(study.arms.front().gyros.empty());
+    for (const GyroStatistics& gyro : study.arms.front().gyros) EXPECT_NEAR(gyro.rate_error_deg_h, 0.0, 1e-4);
 }
 
 TEST(ReadStudies, AreTheSameOnAnyNumberOfThreads) {
@@ -232,7 +234,9 @@ TEST(ReadStudies, ALockedGyroIsLockedInSpiteOfADitherThatIsLeft) {
         largest_arcsec = std::max(largest_arcsec, std::abs(rate_deg_h) * s.ensemble.duration_s);
     }
     EXPECT_GT(largest_arcsec, s.gyro.scale_factor_arcsec);
-    for (const SweepPoint& point : summarise(study).arms.front().sweep) EXPECT_EQ(point.locked, 4);
+    const auto summary = summarise(study);
+    ASSERT_FALSE(summary.arms.front().sweep.empty());
+    for (const SweepPoint& point : summary.arms.front().sweep) EXPECT_EQ(point.locked, 4);
 }
 
 // The answer of read-by-count.toml, for fewer gyros and half of the time.

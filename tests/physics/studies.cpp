@@ -261,7 +261,9 @@ TEST(LongScenarios, WhatIdealReadoutLeavesIsOfTheInjectedNoiseNotOfTables) {
         scenario.propagation.turn_map_tolerance_rad = tolerance_rad;
         scenario.arms = scenario::parse_arms({"noise_injected+compensated_exact"});
         const study::Study study = study::run(study::Study(scenario), 2);
-        for (const study::EnsemblePoint& point : study::summarise(study).arms[0].allan) {
+        const study::Summary summary = study::summarise(study);
+        EXPECT_FALSE(summary.arms[0].allan.empty());
+        for (const study::EnsemblePoint& point : summary.arms[0].allan) {
             if (point.tau_s < 250.0) continue;
             std::printf(
                 "rms %g rad, tables to %g rad, off by %.2g: Allan deviation %.4g deg/h (%.2g .. %.2g) at %.0f s\n",

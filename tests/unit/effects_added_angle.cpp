@@ -54,7 +54,9 @@ TEST(AddedAngles, AreThoseOfAllEffectsThatSayTheyAddOne) {
         adding += effect->adds_angle() ? 1 : 0;
     }
     EXPECT_EQ(adding, stated().size());
-    for (const Stated& s : stated()) EXPECT_TRUE(find(s.name)->adds_angle()) << s.name;
+    for (const Stated& s : stated()) {
+        EXPECT_TRUE(find(s.name)->adds_angle()) << s.name;
+    }
 }
 
 TEST(AddedAngles, AreTheIntegralsOfTheStatedRates) {

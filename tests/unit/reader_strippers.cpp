@@ -193,7 +193,10 @@ TEST(Strippers, CountsAtMovedCrossingsAreWhole) {
     settings.fraction = Fraction::none;
     settings.reference_noise_arcsec = 1.3;
     constexpr double k_arcsec = 2.0;
-    Reader reader(settings, 100.0, {.scale_factor_arcsec = k_arcsec, .dither_hz = 100.0});
+    Source source;
+    source.scale_factor_arcsec = k_arcsec;
+    source.dither_hz = 100.0;
+    Reader reader(settings, 100.0, source);
     std::vector<Instant> instants;
     for (int i = 0; i < 400; ++i) {
         // Each tick is a cycle after a crossing, whose angle it then has.

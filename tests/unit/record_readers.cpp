@@ -110,7 +110,9 @@ TEST(Readers, ACountIsInQuarterFringes) {
     s.reader.stripping = reader::Stripping::none;
     s.reader.fraction = reader::Fraction::none;
     const double quarter = 0.25 * s.gyro.scale_factor_arcsec;
-    for (const double increment : simulate_record(s).samples->values) {
+    const record::Record record = simulate_record(s);
+    ASSERT_FALSE(record.samples->values.empty());
+    for (const double increment : record.samples->values) {
         EXPECT_NEAR(increment / quarter, std::nearbyint(increment / quarter), 1e-6);
     }
 }

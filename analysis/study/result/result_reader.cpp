@@ -34,8 +34,9 @@ struct Allowed {
     const char* words = "a number up to 1e100 in size, or NaN where there is none";
 };
 constexpr Allowed finite_number{-1e100, 1e100, false, "a finite number up to 1e100 in size"};
-constexpr Allowed deviation{0.0, 1e100, true, "a number from 0 on, or NaN where there is none"};
-constexpr Allowed freedom{0.0, 1e15, true, "0 or degrees of freedom from 0.01 to 1e15, or NaN where there are none"};
+constexpr Allowed allowed_deviation{0.0, 1e100, true, "a number from 0 on, or NaN where there is none"};
+constexpr Allowed allowed_freedom{0.0, 1e15, true,
+                                  "0 or degrees of freedom from 0.01 to 1e15, or NaN where there are none"};
 constexpr double least_freedom = 0.01;
 
 /// Checks that values are within their range, since they are evaluated later by functions that have no value far
@@ -43,7 +44,7 @@ constexpr double least_freedom = 0.01;
 void check_values(const store::Dataset& dataset, const std::vector<double>& values, const Allowed& allowed) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         const double v = values[i];
-        const bool too_free = allowed.words == freedom.words && v > 0.0 && v < least_freedom;
+        const bool too_free = allowed.words == allowed_freedom.words && v > 0.0 && v < least_freedom;
         if (std::isnan(v) ? allowed.nan : v >= allowed.least && v <= allowed.most && !too_free) continue;
         throw InputError(
             fmt::format("{}: dataset {}: element {} (counted from 0, row by row) is {}; must be {}: "
@@ -152,13 +153,14 @@ class ArmReader {
         const store::Group allan = group_.group("allan");
         const std::uint64_t taus = layout::most_taus(experiment_);
         const Allowed whole{-128.0, 9e15, true, "a whole number up to 9e15"};
-        const auto tau = read_column(allan, "tau_s", layout::tau_shape(experiment_), deviation);
+        const auto tau = read_column(allan, "tau_s", layout::tau_shape(experiment_), allowed_deviation);
         const auto terms = read_column(allan, "terms", layout::tau_shape(experiment_), whole);
         const auto alpha = read_column(allan, "alpha", {gyros_, taus}, whole);
         std::vector<std::vector<double>> columns;
         for (const auto& column : allan_columns) {
             const bool is_edf = column.field == &allan::Point::edf;
-            columns.push_back(read_column(allan, column.name, {gyros_, taus}, is_edf ? freedom : deviation));
+            columns.push_back(
+                read_column(allan, column.name, {gyros_, taus}, is_edf ? allowed_freedom : allowed_deviation));
         }
         std::size_t row = 0;
         for (std::size_t p = 0; p < experiment_.points.size(); ++p) {

@@ -236,7 +236,8 @@ void set_size(Added& added, double size) {
 
 /// Whether all sizes are well within their bounds.
 bool is_within_bounds(const Added& added) {
-    for (const effects::Parameter& parameter : effects::find(added.effect)->parameters()) {
+    const effects::Effect& effect = *effects::find(added.effect);
+    for (const effects::Parameter& parameter : effect.parameters()) {
         const double value = added.values.at(std::string(parameter.name));
         if (parameter.role == effects::Role::size && !(value > 0.5 * parameter.min && value < 0.5 * parameter.max)) {
             return false;
