@@ -30,7 +30,7 @@ struct Options {
 
     /// Most effects that one record may need, and most candidates that are fitted in full for each of them.
     std::size_t most_steps = 8;
-    std::size_t most_contenders = 5;
+    std::size_t most_finalists = 5;
 
     /// The record is cut into this number of contiguous blocks, and one block of each run of `blocks_in_a_row` is held
     /// out: effects are selected and parameters fitted on the others, so that the error on the held-out rows can be

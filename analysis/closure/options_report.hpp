@@ -38,7 +38,7 @@ struct ReportOptions {
     /// Most lines with a figure of their own; the reach of the figure to either side, in resolutions of the record; and
     /// points per resolution.
     std::size_t most_lines_drawn = 4;
-    int resolutions_beside_line = 20;
+    int resolutions_around_line = 20;
     int points_a_resolution = 8;
 
     /// Phases with fewer turns than this are not compared: their kicks are not determined.

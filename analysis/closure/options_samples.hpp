@@ -52,18 +52,18 @@ struct SampleRecordOptions {
 struct SampleFitOptions {
     /// A row of a resampled record is deterministic, given the rows before it, except for its digits, if its standard
     /// deviation is less than this share of the largest one;
-    double settled_sd = 0.03;
+    double deterministic_sd = 0.03;
     /// or if a rounding step larger by this factor
     double coarser_digits = 1.5;
     /// makes its standard deviation larger by this factor.
-    double settled_growth = 1.01;
+    double deterministic_growth = 1.01;
     /// The same factor for a row that mostly determines the deviation of readings from the source's straight lines, if
     /// that deviation is enlarged by coarser_digits. A source whose clock jitters makes it heavy-tailed.
     double blurred_growth = 1.15;
     /// A column whose part orthogonal to the model's own columns has no more than this share of its squares is one of
     /// them except for rounding [1]: the record does not distinguish it from the model's parameters. Several columns
     /// are independent of each other if the ratio of their pivots is larger than this.
-    double told_apart = 1e-8;
+    double least_independent_share = 1e-8;
     /// A resonance that is wider than this has no structure within the record's frequencies; the fit tries the model
     /// without it [rates of the record or of its source].
     double widest_resonance = 3.0;
@@ -111,9 +111,8 @@ struct SampleFitOptions {
     double motion_refitted = 1.0;
     /// Times at which a record is searched for a step before the most likely one is refined, and times in a gap between
     /// rows that count.
-    std::size_t places_of_a_step = 80;
-    std::size_t places_in_a_gap = 32;
-    double dither_first_share = 0.9;  ///< for the search of frequency and place: larger shares show them from near only
+    std::size_t positions_of_step = 80;
+    std::size_t positions_in_gap = 32;
     /// Effort: rounds in which each step is placed again with the others in the model.
     int most_step_rounds = 3;
     /// Steps of values that are smaller than this share of the standard deviation are not visible in held-out errors.
@@ -148,7 +147,7 @@ struct SampleLineOptions {
     /// likely line is removed.
     double left_parts = 3.0;
     /// Distance within which the residual of a line belongs to that line, and other lines may be artefacts of it [Hz].
-    double beside_hz = 1.0;
+    double adjacent_hz = 1.0;
     /// Cost of each coefficient of a curved frequency track [chi-squared]: 6 nats, as for a search over half a cycle a
     /// piece.
     double bend = 12.0;
@@ -282,7 +281,7 @@ struct SampleScreenOptions {
     /// Effort: positions of the record's start within the interval of a source from which fits start. A record's own
     /// white errors, which may be small against those of its rates, are then multiplied by `error_step` while that is
     /// likelier, at most `most_error_steps` times.
-    int places_of_source = 8;
+    int phases_of_source = 8;
     double error_step = 1.5;
     int most_error_steps = 10;
 };
@@ -298,12 +297,13 @@ struct SampleContestOptions {
     /// nearly the same and take long: they are omitted if the evidence of the first is less than `far` of the largest.
     std::size_t first_sources = 2;
     double far = 0.5;
-    /// Candidates in addition to Options::most_contenders that are fitted in full for samples.
-    std::size_t more_contenders = 2;
+    /// Candidates in addition to Options::most_finalists that are fitted in full for samples.
+    std::size_t more_finalists = 2;
     /// Effects from which sets of two or three start.
     std::size_t set_starts = 4;
-    /// Residual tests that are fitted as rivals, in addition to jumps and rates that follow another column.
-    std::size_t most_rivals = 4;
+    /// Residual tests that are fitted and compete with the effects, in addition to jumps and rates that follow another
+    /// column.
+    std::size_t most_competing_tests = 4;
     /// Resampling is blurred if interpolated readings deviate from the straight line by more than this share of their
     /// errors. Then the variance varies by less than half, as any variance may, and resampling must explain more than a
     /// free variance by a tie.
@@ -317,7 +317,7 @@ struct SampleContestOptions {
     /// Sources of a resampled record are the same within this [of the record's rate].
     double same_source = 1e-3;
     /// Sources faster than this are not distinguished from others that make the same pattern [of the record's rate].
-    double told_up_to = 2.0;
+    double distinguished_up_to = 2.0;
 };
 
 /// Residual tests (samples/residual).
@@ -349,11 +349,11 @@ struct SampleResidualOptions {
     /// Stretches of the record that may have one of two levels.
     std::size_t level_stretches = 120;
     /// Resolution of the time of a jump, in parts of a stretch.
-    std::size_t jump_places = 50;
+    std::size_t jump_positions = 50;
     /// Polynomials of time up to this degree.
     std::size_t polynomial_degrees = 6;
     /// Number of times at which a step of the rate is tested.
-    std::size_t step_places = 40;
+    std::size_t step_positions = 40;
     /// Number of slow oscillations, each with a quarter of a period over the record more than the one before.
     std::size_t slow_swings = 32;
     /// Number of time constants of a rate that settles, from the length of the record down, each shorter by this
@@ -382,17 +382,17 @@ struct SampleRoundedOptions {
     /// [steps].
     double least_angle_noise = 0.02;
     /// Effort at the start: the most likely noises are found on the first part of the record [rows] by at most
-    /// `climbs_at_start` steps. Then the model is fitted again in rounds, each after some imputations of the
+    /// `steps_at_start` steps. Then the model is fitted again in rounds, each after some imputations of the
     /// increments.
     std::size_t first_look = 6000;
-    int climbs_at_start = 12;
+    int steps_at_start = 12;
     int rounds_at_start = 2;
     int draws_a_round = 2;
     /// Effort: steps towards the maximum of the likelihood before increments are imputed, the same from a model without
     /// the random walk that is added, and before figures are reported.
-    int climbs = 2;
-    int climbs_with_walk = 6;
-    int climbs_of_figures = 4;
+    int most_steps = 2;
+    int steps_with_walk = 6;
+    int steps_of_figures = 4;
     /// Imputations over which reported figures and their standard errors are averaged. The information that rounding
     /// hides is the scatter between imputations, which eight determine to a quarter.
     int draws_of_figures = 8;
@@ -402,7 +402,7 @@ struct SampleRoundedOptions {
     /// degrees of freedom one case in a thousand.
     double wanders = 2.5;
     /// Increments are imputed with a random walk that the model lacks if that is likelier by more [nats].
-    double drawn_beside_walk = 12.0;
+    double drawn_with_walk = 12.0;
     /// With very large steps few of the filters contain the moments at which the angle crosses a step: the variance
     /// that they predict may be wrong by this share of it.
     double filters_off = 0.1;
@@ -429,7 +429,7 @@ struct SampleLoopOptions {
     /// Imputations of rounded increments after each effect that is added.
     int draws = 2;
     /// Residual tests that are fitted to locate the structure that the model does not explain.
-    std::size_t most_views = 4;
+    std::size_t most_tests = 4;
     /// Most placeholders that are added for structure which the library does not have, so that other effects can be
     /// found.
     int most_placeholders = 3;

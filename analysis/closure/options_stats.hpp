@@ -27,12 +27,12 @@ struct StatsOptions {
         /// computing time.
         double share_of_response = 0.9;
         /// Places tried within the length of that response: a place 1/32 of it off loses little of the chi-squared.
-        std::size_t places_per_length = 16;
+        std::size_t positions_per_length = 16;
         /// Share of the response's squares that must fall on training rows for a place to count [1].
         double share_counted = 0.3;
         /// Fewest places. With fewer, the response to a step hardly decays within the record, and a random rate looks
         /// like a step.
-        double fewest_places = 40.0;
+        double fewest_positions = 40.0;
     };
     Jumps jumps;
 

@@ -77,7 +77,7 @@ struct TurnOptions {
         double weak_noise = 100.0;
         /// Another start of the noise is maximised if it begins less than this below the present maximum [nats]: the
         /// maxima of one likelihood are near each other.
-        double summits_apart = 20.0;
+        double maxima_apart = 20.0;
 
         /// Effort: passes of Gauss-Newton between two fits of the noise, the same in a fit without weak noise, and
         /// rounds of both together.
@@ -115,7 +115,7 @@ struct TurnOptions {
 
         /// A column whose part orthogonal to the model's own columns is less than this is one of them except for
         /// rounding [1]: the record does not distinguish it from the model's parameters.
-        double told_apart = 1e-5;
+        double least_independent_share = 1e-5;
 
         /// Most passes of a regression, each with the noise fitted again.
         int most_regression_passes = 8;
@@ -197,7 +197,7 @@ struct TurnOptions {
         std::size_t peaks = 4;
         /// Independent frequencies in the band, relative to the Fourier frequencies: half as many again, since maxima
         /// also lie between these (Quinn and Hannan, The Estimation and Tracking of Frequency, 2001, section 3).
-        double places_per_bin = 1.5;
+        double trials_per_bin = 1.5;
         /// Cost of an oscillation in addition to its amplitudes and the search [nats]: its frequency, fitted between
         /// two independent ones.
         double cost_of_frequency = 1.0;
@@ -246,7 +246,7 @@ struct TurnOptions {
         /// Lowest bin of the padded spectrum that can be a line: two periods in the record. Slower is drift.
         std::size_t lowest_bin = 4;
         /// Independent frequencies per Fourier frequency (Quinn and Hannan 2001, section 3).
-        double places_per_bin = 1.5;
+        double trials_per_bin = 1.5;
         /// Sums of fewer innovations than this may be flatter than normal ones: bounded noise is no structure, and
         /// longer sums are normal enough.
         std::size_t bounded_sums = 16;
@@ -267,9 +267,9 @@ struct TurnOptions {
         std::size_t finer = 3;
         /// Cost of the exact place of each jump within its stretch [nats].
         double cost_of_place = 2.0;
-        /// Jumps are fitted with their own noise if their evidence reaches this share of the rival's [1]. Of a true
-        /// random rate they explain far less, and there are many.
-        double near_rival = 0.9;
+        /// Jumps are fitted with their own noise if their evidence reaches this share of that of the competing effects
+        /// [1]. Of a true random rate they explain far less, and there are many.
+        double near_competing = 0.9;
         /// Effort: searches under the noise that the jumps leave, passes that move all jumps together, and single stays
         /// whose removal is tried.
         int most_searches = 4;
@@ -278,7 +278,7 @@ struct TurnOptions {
         /// Moves end at gains below this [nats], or below this share of the evidence, since large values of the
         /// evidence are compared only that precisely.
         double gained = 0.1;
-        double gained_of_merit = 1e-4;
+        double gained_of_evidence = 1e-4;
         /// Times are first found to this part of a stretch, and a joint move is shortened to this part of itself [1].
         double place_precision = 0.02;
         double least_share_of_move = 0.1;
@@ -323,7 +323,7 @@ struct TurnOptions {
         double nearly_best = 0.9;
         /// Evidence above which fits that stay far below it are not completed [nats], and the share of it that they
         /// must reach.
-        double much_merit = 200.0;
+        double much_evidence = 200.0;
         double far_below = 0.5;
 
         /// Candidates that are tried as first and second member of a pair, and as third member of a triple.
@@ -331,7 +331,7 @@ struct TurnOptions {
         std::size_t second_of_pair = 2;
         std::size_t third_of_triple = 2;
         /// Share of the largest evidence that a pair without a random rate must have for a third effect to be tried.
-        double most_of_merit = 0.75;
+        double most_of_evidence = 0.75;
         /// Second effects that are tried next to one of the coupling.
         std::size_t second_of_coupling = 3;
 

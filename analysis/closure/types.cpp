@@ -23,7 +23,7 @@ std::string_view name_of(Where where) {
 }
 
 std::string ResidualTest::description() const {
-    return fmt::format("{}{}{}, by chance p {}", view, detail.empty() ? "" : ", ", detail, probability(p_value));
+    return fmt::format("{}{}{}, by chance p {}", subject, detail.empty() ? "" : ", ", detail, probability(p_value));
 }
 
 std::vector<std::string> names_of(const std::vector<const effects::Effect*>& effects) {

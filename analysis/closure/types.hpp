@@ -35,10 +35,10 @@ std::string_view name_of(Where where);
 /// One test of the residual, with the probability of its outcome by chance; the test's own search is included in it.
 struct ResidualTest {
     Where where;
-    std::string view;  ///< the quantity or pattern that the residual was tested against
+    std::string subject;  ///< the quantity or pattern that the residual was tested against
     double p_value = 1.0;
-    std::string detail;  ///< the largest deviation that was found
-    double merit = 0.0;  ///< evidence of a regression: gain of the log-likelihood less parameters and search
+    std::string detail;     ///< the largest deviation that was found
+    double evidence = 0.0;  ///< evidence of a regression: gain of the log-likelihood less parameters and search
 
     std::string description() const;
 };

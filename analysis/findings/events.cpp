@@ -71,8 +71,8 @@ Scan scan_pulses(const std::vector<double>& residual, const std::vector<double>&
     const std::vector<double> own = sums_of_cosines(weight, 0.5);
     const std::vector<double> next = doublets ? sums_of_cosines(weight, 0.0) : std::vector<double>();
     Scan out;
-    const std::size_t places = doublets ? n - 1 : n;
-    for (std::size_t t = 0; t < places; ++t) {
+    const std::size_t positions = doublets ? n - 1 : n;
+    for (std::size_t t = 0; t < positions; ++t) {
         double numerator = numerators[t];
         double denominator = (total + own[t]) / count;
         if (doublets) {

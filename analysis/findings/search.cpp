@@ -116,7 +116,7 @@ class Search {
     }
 
     /// All events of that kind that stand out from their neighbours, and more so than events of the other kind there.
-    bool take_all(Event event, const Scan& found, const Scan& rivals) {
+    bool take_all(Event event, const Scan& found, const Scan& competing) {
         constexpr std::size_t apart = 3;
         bool any = false;
         std::size_t last = 0;
@@ -127,7 +127,7 @@ class Search {
             bool largest = true;
             for (std::size_t k = t - std::min(t, apart); k < std::min(n, t + apart + 1); ++k) {
                 largest = largest && std::abs(found.sigma[k]) <= size;
-                if (k < rivals.sigma.size()) largest = largest && std::abs(rivals.sigma[k]) <= size;
+                if (k < competing.sigma.size()) largest = largest && std::abs(competing.sigma[k]) <= size;
             }
             if (!largest) continue;
             take_one(event, t, found, t);

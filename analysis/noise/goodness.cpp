@@ -24,10 +24,10 @@ double kolmogorov_tail(double t) {
 
 /// Upper tail of the squares next to a line: whether the supposed line is broad.
 double broadness(std::span<const double> w, const Line& line) {
-    constexpr std::ptrdiff_t beside = 12;
+    constexpr std::ptrdiff_t half_width = 12;
     const auto middle = static_cast<std::ptrdiff_t>(std::llround(line.index));
-    const std::ptrdiff_t begin = std::max<std::ptrdiff_t>(1, middle - beside);
-    const std::ptrdiff_t end = std::min(static_cast<std::ptrdiff_t>(w.size()), middle + beside);
+    const std::ptrdiff_t begin = std::max<std::ptrdiff_t>(1, middle - half_width);
+    const std::ptrdiff_t end = std::min(static_cast<std::ptrdiff_t>(w.size()), middle + half_width);
     double sum = 0.0;
     for (std::ptrdiff_t j = begin; j <= end; ++j) sum += w[static_cast<std::size_t>(j - 1)];
     const auto degrees = static_cast<double>(end - begin + 1 - 3);  // less what the line has taken
@@ -93,16 +93,16 @@ Goodness goodness_of_fit(const Spectrum& spectrum, const Maximum& best, std::spa
     const Line* broadest = nullptr;
     for (const Line& line : lines) {
         const double p = std::min(1.0, static_cast<double>(lines.size()) * broadness(w, line));
-        if (p < out.p_beside) {
-            out.p_beside = p;
+        if (p < out.p_around_lines) {
+            out.p_around_lines = p;
             broadest = &line;
         }
     }
 
-    if (out.p_beside < threshold) {
+    if (out.p_around_lines < threshold) {
         out.reason =
             fmt::format("a peak at {:.4g} Hz that is broader than a line (p = {:.1e})",
-                        0.5 * broadest->index / (static_cast<double>(spectrum.samples) * tau0_s), out.p_beside);
+                        0.5 * broadest->index / (static_cast<double>(spectrum.samples) * tau0_s), out.p_around_lines);
     } else if (out.p_line < threshold) {
         out.reason = fmt::format("a spectral line at {:.4g} Hz (p = {:.1e})", frequency(largest), out.p_line);
     } else if (out.p_bands < threshold) {

@@ -8,12 +8,12 @@ namespace ringlock::noise {
 
 /// Does the model describe the spectrum? Each p is the chance of a misfit as large if it does.
 struct Goodness {
-    double p_cumulative = 1.0;  ///< cumulative periodogram (Bartlett; Kolmogorov): power at the wrong frequencies
-    double p_bands = 1.0;       ///< chi-squared over bands of frequency: bumps and holes
-    double p_line = 1.0;        ///< largest coefficient (Fisher): one more spectral line
-    double p_beside = 1.0;      ///< chi-squared next to each line that was found: a narrow resonance is no line
-    bool accepted = true;       ///< none of them below the threshold
-    std::string reason;         ///< where not accepted: which test, where in frequency
+    double p_cumulative = 1.0;    ///< cumulative periodogram (Bartlett; Kolmogorov): power at the wrong frequencies
+    double p_bands = 1.0;         ///< chi-squared over bands of frequency: bumps and holes
+    double p_line = 1.0;          ///< largest coefficient (Fisher): one more spectral line
+    double p_around_lines = 1.0;  ///< chi-squared next to each line that was found: a narrow resonance is no line
+    bool accepted = true;         ///< none of them below the threshold
+    std::string reason;           ///< where not accepted: which test, where in frequency
 };
 
 /// \param spectrum   the record without its lines

@@ -118,7 +118,7 @@ void each(Archive& archive, T& g) {
     archive(g.p_cumulative);
     archive(g.p_bands);
     archive(g.p_line);
-    archive(g.p_beside);
+    archive(g.p_around_lines);
     archive(g.accepted);
     archive(g.reason);
 }

@@ -337,8 +337,8 @@ void Checkpoints::wait_out(const std::string& problem, int error) {
         } else if (now - *gone_ > longest_without_folder) {
             throw RunError(fmt::format("{}: the folder is gone", printable(path_)));
         }
-        if (!told_ || now - *told_ > between_complaints) {
-            told_ = now;
+        if (!reported_ || now - *reported_ > between_complaints) {
+            reported_ = now;
             tells = true;
         }
     }

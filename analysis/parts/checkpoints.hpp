@@ -121,9 +121,9 @@ class Checkpoints final : public study::Store {
     double blocks_s_ = 0.0;
     std::string last_block_;
     std::atomic<bool> patient_ = true;
-    std::optional<std::chrono::steady_clock::time_point> told_;  ///< that the run waits
-    std::optional<std::chrono::steady_clock::time_point> gone_;  ///< since when the folder is
-    std::jthread worker_;                                        // last: it uses all of the above
+    std::optional<std::chrono::steady_clock::time_point> reported_;  ///< that the run waits
+    std::optional<std::chrono::steady_clock::time_point> gone_;      ///< since when the folder is
+    std::jthread worker_;                                            // last: it uses all of the above
 };
 
 }  // namespace ringlock::parts

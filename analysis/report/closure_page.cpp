@@ -172,7 +172,7 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
         "for its own search.\n\n";
     page += "| where | test | p | largest |\n|---|---|---|---|\n";
     for (const closure::ResidualTest& test : closure.tests) {
-        page += fmt::format("| {} | {} | {} | {} |\n", closure::name_of(test.where), cell(test.view),
+        page += fmt::format("| {} | {} | {} | {} |\n", closure::name_of(test.where), cell(test.subject),
                             closure::probability(test.p_value), cell(test.detail));
     }
     page += "\n";

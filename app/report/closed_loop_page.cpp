@@ -135,7 +135,7 @@ void add_checks(report::Page& page, const closure::Report& report) {
     page.heading("Tests of the residual");
     Table tests({{"where"}, {"test"}, {"p", Align::right}, {"largest"}});
     for (const closure::ResidualTest& test : report.closure.tests) {
-        tests.add_row({std::string(closure::name_of(test.where)), printable(test.view),
+        tests.add_row({std::string(closure::name_of(test.where)), printable(test.subject),
                        closure::probability(test.p_value), printable(test.detail)});
     }
     page.table(tests, "Each p includes the look-elsewhere correction of its own search");

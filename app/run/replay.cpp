@@ -136,7 +136,7 @@ std::filesystem::path output_of(const ReplayArguments& arguments, const study::G
 }
 
 /// The data from which the summary of a finished replay is made.
-struct Told {
+struct ReplayReport {
     const study::GyroOfResult& of;
     const study::GyroReplay& replay;
     const study::GyroReplay::Range& range;
@@ -145,17 +145,17 @@ struct Told {
     std::filesystem::path out;
 };
 
-std::string in_words(const Told& told) {
-    const study::ReplayFigures& figures = told.figures;
-    std::string text = fmt::format("{}\n", told.of.text());
+std::string in_words(const ReplayReport& report) {
+    const study::ReplayFigures& figures = report.figures;
+    std::string text = fmt::format("{}\n", report.of.text());
     const auto line = [&](std::string_view what, const std::string& value) {
         text += fmt::format("  {:<33}{}\n", fmt::format("{}:", what), value);
     };
     for (const auto& parameter : study::drawn_parameters) {
-        line(parameter.name, fmt::format("{:.9g}", told.replay.setup().*parameter.field));
+        line(parameter.name, fmt::format("{:.9g}", report.replay.setup().*parameter.field));
     }
     line("turns", fmt::format("{}, from {:.6g} s to {:.6g} s of the record", figures.turns,
-                              told.replay.time_s(told.range.first), told.replay.time_s(told.range.last - 1)));
+                              report.replay.time_s(report.range.first), report.replay.time_s(report.range.last - 1)));
     line("lock-in from turn to turn, rms", fmt::format("{:.6g} rad", figures.lockin_step_rms_rad));
     line("the compensator leaves, rms", fmt::format("{:.6g} rad", figures.left_step_rms_rad));
     if (figures.angle_error_arcsec) {
@@ -164,32 +164,33 @@ std::string in_words(const Told& told) {
     if (figures.rate_error_deg_h) line("rate error", fmt::format("{:.6g} deg/h", *figures.rate_error_deg_h));
     std::string agrees = "parameters as drawn";
     if (figures.rate_error_deg_h) agrees += ", rate error";
-    if (told.compared) {
-        agrees += fmt::format(", {} of {} samples of the record", figures.samples, told.replay.schedule().samples);
+    if (report.compared) {
+        agrees += fmt::format(", {} of {} samples of the record", figures.samples, report.replay.schedule().samples);
     }
     line("identical to the stored values", agrees);
-    if (!told.compared) line("angle record", "not stored (output.angle_record = false), so not compared");
+    if (!report.compared) line("angle record", "not stored (output.angle_record = false), so not compared");
     return text;
 }
 
-std::string in_json(const Told& told, const store::Provenance& provenance) {
-    const study::ReplayFigures& figures = told.figures;
+std::string in_json(const ReplayReport& report, const store::Provenance& provenance) {
+    const study::ReplayFigures& figures = report.figures;
     const auto number = [](const std::optional<double>& value) {
         return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
     };
     nlohmann::ordered_json drawn;
-    for (const auto& parameter : study::drawn_parameters) drawn[parameter.name] = told.replay.setup().*parameter.field;
+    for (const auto& parameter : study::drawn_parameters)
+        drawn[parameter.name] = report.replay.setup().*parameter.field;
     const nlohmann::ordered_json json{
-        {"replay", told.out.string()},
-        {"result", told.of.result.string()},
-        {"seed", told.of.experiment.scenario.ensemble.seed},
-        {"arm", told.of.arm_name()},
-        {"point", told.of.point + 1},
-        {"gyro", told.of.gyro},
+        {"replay", report.out.string()},
+        {"result", report.of.result.string()},
+        {"seed", report.of.experiment.scenario.ensemble.seed},
+        {"arm", report.of.arm_name()},
+        {"point", report.of.point + 1},
+        {"gyro", report.of.gyro},
         {"drawn", drawn},
         {"turns", figures.turns},
-        {"from_s", told.replay.time_s(told.range.first)},
-        {"to_s", told.replay.time_s(told.range.last - 1)},
+        {"from_s", report.replay.time_s(report.range.first)},
+        {"to_s", report.replay.time_s(report.range.last - 1)},
         {"lockin_step_rms_rad", figures.lockin_step_rms_rad},
         {"left_step_rms_rad", figures.left_step_rms_rad},
         {"angle_error_arcsec", number(figures.angle_error_arcsec)},
@@ -197,9 +198,9 @@ std::string in_json(const Told& told, const store::Provenance& provenance) {
         {"agrees",
          {{"drawn", true},
           {"rate_error", figures.rate_error_deg_h ? nlohmann::ordered_json(true) : nlohmann::ordered_json(nullptr)},
-          {"record", told.compared ? nlohmann::ordered_json(true) : nlohmann::ordered_json(nullptr)}}},
-        {"samples_compared", told.compared ? figures.samples : 0},
-        {"samples", told.replay.schedule().samples},
+          {"record", report.compared ? nlohmann::ordered_json(true) : nlohmann::ordered_json(nullptr)}}},
+        {"samples_compared", report.compared ? figures.samples : 0},
+        {"samples", report.replay.schedule().samples},
         {"wall_s", provenance.wall_s}};
     return json_text(json, 2) + "\n";
 }
@@ -240,11 +241,11 @@ void run(const ReplayArguments& arguments, std::span<const char* const> command_
     provenance.turns_per_s = static_cast<double>(range.last) / provenance.wall_s;
     provenance.instruction_set = simd::active_target();
     writer.finish(figures, stored.has_record(), provenance);
-    const Told told{of, replay, range, figures, stored.has_record(), out};
+    const ReplayReport report{of, replay, range, figures, stored.has_record(), out};
     if (arguments.json) {
-        put(in_json(told, provenance));
+        put(in_json(report, provenance));
     } else if (!arguments.quiet) {
-        put(in_words(told));
+        put(in_words(report));
     }
     if (!arguments.quiet) tell(fmt::format("replay: {}\n", printable(writer.path())));
 }

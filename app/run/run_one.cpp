@@ -106,7 +106,7 @@ class Outcome {
         try {
             on_outcome_(experiment, summaries, provenance_);
         } catch (const RunError&) {
-            not_told_ = std::current_exception();
+            not_reported_ = std::current_exception();
         }
         write_samples();
         check_interrupt();
@@ -117,8 +117,8 @@ class Outcome {
 
     /// A table that cannot be printed must not prevent the result from being written; it is a failure once the result
     /// is complete.
-    void fail_if_not_told() const {
-        if (not_told_) std::rethrow_exception(not_told_);
+    void fail_if_not_reported() const {
+        if (not_reported_) std::rethrow_exception(not_reported_);
     }
 
    private:
@@ -126,7 +126,7 @@ class Outcome {
     store::Provenance provenance_;
     const OnOutcome& on_outcome_;
     std::unique_ptr<AtomicPath> figure_;
-    std::exception_ptr not_told_;
+    std::exception_ptr not_reported_;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
@@ -147,7 +147,7 @@ void run_without_checkpoints(const RunArguments& arguments, Task task, Outcome o
     check_interrupt();
     outcome.spent(experiment, 0.0);
     outcome.write(writer, experiment, progress, [] {});
-    outcome.fail_if_not_told();
+    outcome.fail_if_not_reported();
 }
 
 void run_whole(const RunArguments& arguments, Task task, double every_s, Outcome outcome) {
@@ -170,7 +170,7 @@ void run_whole(const RunArguments& arguments, Task task, double every_s, Outcome
         });
         session.remove_folder();
     });
-    outcome.fail_if_not_told();
+    outcome.fail_if_not_reported();
 }
 
 void run_shard(const RunArguments& arguments, Task task, double every_s, Outcome outcome) {

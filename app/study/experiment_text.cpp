@@ -132,7 +132,7 @@ std::vector<report::Table> points_tables(std::size_t points, const std::vector<P
 }
 
 /// Most keys that are printed next to the figures; more keys have tables of their own.
-constexpr std::size_t most_keys_beside = 4;
+constexpr std::size_t most_keys_in_table = 4;
 
 std::vector<PointColumn> key_columns(const study::Experiment& experiment, const DesignLayout& layout) {
     std::vector<PointColumn> columns;
@@ -151,14 +151,14 @@ template <class Cell>
 std::vector<report::Table> figure_tables(const study::Experiment& experiment,
                                          const std::vector<study::Summary>& summaries, const DesignLayout& layout,
                                          Cell&& cell) {
-    const bool beside = experiment.axes.size() <= most_keys_beside;
+    const bool keys_in_table = experiment.axes.size() <= most_keys_in_table;
     std::vector<PointColumn> arms;
     for (std::size_t a = 0; a < summaries.front().arms.size(); ++a) {
         const std::string name = layout.names ? summaries.front().arms[a].name : fmt::format("({})", a + 1);
         arms.push_back({name, [&, a](std::size_t p) { return cell(summaries[p].arms[a]); }});
     }
-    return points_tables(summaries.size(), beside ? key_columns(experiment, layout) : std::vector<PointColumn>{}, arms,
-                         layout);
+    return points_tables(summaries.size(), keys_in_table ? key_columns(experiment, layout) : std::vector<PointColumn>{},
+                         arms, layout);
 }
 
 std::string index_cell(const design::Index& index) {
@@ -236,7 +236,7 @@ std::vector<report::Passage> design_passages(const study::Experiment& experiment
         first.notes += "Only some of the points are shown; all are in the file and in --json.\n";
     }
     if (!first.notes.empty()) all.push_back(std::move(first));
-    if (experiment.axes.size() > most_keys_beside) {
+    if (experiment.axes.size() > most_keys_in_table) {
         add_tables("Keys", points_tables(summaries.size(), {}, key_columns(experiment, layout), layout), all);
     }
     const auto add = [&](const char* heading, auto&& cell) {

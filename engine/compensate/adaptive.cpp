@@ -32,7 +32,7 @@ Adaptive::Adaptive(const Calibration& calibration, const readout::Electronics& e
       exact_(calibration, tolerance_rad, coupling_share) {
     recovery_.learn();
     for (std::size_t lane = 0; lane < lanes_; ++lane) {
-        filters_.emplace_back(recovery_.told(lane));
+        filters_.emplace_back(recovery_.coupling_of_tables(lane));
         const double period_s = calibration.positive_duration_s[lane] + calibration.negative_duration_s[lane];
         between_estimates_s_.push_back(0.5 * period_s * turns_between_estimates);
     }
@@ -41,7 +41,7 @@ Adaptive::Adaptive(const Calibration& calibration, const readout::Electronics& e
 void Adaptive::take_coupling() {
     for (std::size_t lane = 0; lane < lanes_; ++lane) {
         CouplingFilter& filter = filters_[lane];
-        const auto tables = recovery_.told(lane);
+        const auto tables = recovery_.coupling_of_tables(lane);
         if (filter.observe(recovery_.bends(lane), tables, turns_between_estimates, between_estimates_s_[lane])) {
             recovery_.forget_bends(lane);
         }
@@ -50,7 +50,7 @@ void Adaptive::take_coupling() {
         const double ratio = b_rad_s / tables.b_rad_s;
         const double moved = std::hypot(ratio * std::cos(phase_rad - tables.phase_rad) - 1.0,
                                         ratio * std::sin(phase_rad - tables.phase_rad));
-        if (moved > tables_share) recovery_.tell(lane, {b_rad_s, phase_rad});
+        if (moved > tables_share) recovery_.set_coupling(lane, {b_rad_s, phase_rad});
     }
 }
 

@@ -130,7 +130,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         V last_whole = load(state.turn_whole);
         V error = load(state.error_fringes);
         V error_whole = load(state.error_whole);
-        const V told_whole = load(errors.whole);
+        const V whole_before = load(errors.whole);
         for (std::size_t i = first_row; i < last_row; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
@@ -189,15 +189,15 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 pm::HalfMapOf<V> begin, end;
                 if (changing) {
                     // Amplitude and change as seen from either turn.
-                    const auto told = gm::amplitude_after_swing(d, amplitude, last_amplitude, sign, turns_before(i));
-                    const V change = told.amplitude - last_amplitude;
+                    const auto swung = gm::amplitude_after_swing(d, amplitude, last_amplitude, sign, turns_before(i));
+                    const V change = swung.amplitude - last_amplitude;
                     const V half_change = change * half;
                     const V scaled_change = hn::Max(hn::Min(change * change_inverse, one), hn::Neg(one));
                     begin = pm::evaluate(d, part, lane, scaled(amplitude - half_change), zero, zero, scaled_change);
                     end = pm::evaluate(d, part, lane, scaled(amplitude + half_change), zero, zero,
                                        hn::Neg(scaled_change));
-                    last_amplitude = told.amplitude;
-                    middles_rate = middles_rate - told.rotation_less / duration;
+                    last_amplitude = swung.amplitude;
+                    middles_rate = middles_rate - swung.rotation_less / duration;
                 } else {
                     begin = end = pm::evaluate(d, part, lane, scaled(amplitude), zero, zero, zero);
                 }
@@ -210,7 +210,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const sm::Complex<V> q = sm::mul(d, beginning, sm::mul_add(d, z_end, e1, unit));
                 if (errors.middles) {
                     const V bent = sm::arg(d, beginning.re, beginning.im) * hn::Set(d, 0.3183098861837907);
-                    store(sm::fnma(d, sign, bent + begin.shift, error) + (error_whole - told_whole),
+                    store(sm::fnma(d, sign, bent + begin.shift, error) + (error_whole - whole_before),
                           errors.middle_fringes[i]);
                 }
                 const V gain = sm::fma(d, strong ? sm::arg(d, q.re, q.im) : sm::arg_right(d, q.re, q.im),
@@ -222,7 +222,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 error_whole = error_whole + carry;
             }
             // From the dither's turn to the zero-rate point again: the lock-in's share the other way round.
-            store(sm::fnma(d, sign * lockin_rad, per_rad, error) + (error_whole - told_whole), errors.fringes[i]);
+            store(sm::fnma(d, sign * lockin_rad, per_rad, error) + (error_whole - whole_before), errors.fringes[i]);
             last_sine = sine;
             last_cosine = cosine;
             last_fringes = turn_fringes;

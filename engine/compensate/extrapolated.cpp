@@ -41,8 +41,8 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
         const V curve_of[2] = {load(state.curve_per_rad[0]), load(state.curve_per_rad[1])};
         V error = load(state.error_fringes);
         V error_whole = load(state.error_whole);
-        const V told_whole = error_whole;
-        store(told_whole, errors.whole);
+        const V whole_before = error_whole;
+        store(whole_before, errors.whole);
         for (std::size_t i = 0; i < readings.turns; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
@@ -59,7 +59,7 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
                 const V a = a_of[which];
                 V s2 = zero;
                 V sgy = zero;
-                V told_apart = zero;
+                V distinct = zero;
                 s0[side] = s1[side] = sy[side] = zero;
                 for (std::size_t pulse = 0; pulse < readout::kept_pulses; ++pulse) {
                     const V time = load(readings.pulses.time_s[side][pulse][i]);
@@ -71,7 +71,7 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
                     const V rate2 = hn::Max(distance + distance, zero) * a;
                     const V variance = sm::fma(d, rate2, tick_variance, pulse_variance);
                     const V weight = hn::IfThenElseZero(time != zero, one / variance);
-                    told_apart = told_apart + hn::IfThenElseZero(time != zero, one);
+                    distinct = distinct + hn::IfThenElseZero(time != zero, one);
                     const V weighted = weight * slope;
                     s0[side] = s0[side] + weight;
                     s1[side] = s1[side] + weighted;
@@ -79,8 +79,8 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
                     s2 = sm::fma(d, weighted, slope, s2);
                     sgy = sm::fma(d, weighted, y, sgy);
                 }
-                fewest = hn::Min(fewest, told_apart);
-                most = hn::Max(most, told_apart);
+                fewest = hn::Min(fewest, distinct);
+                most = hn::Max(most, distinct);
                 const V mean_slope = s1[side] / s0[side];
                 tau_numerator = tau_numerator + sm::fnma(d, mean_slope, sy[side], sgy);
                 tau_denominator = tau_denominator + sm::fnma(d, mean_slope, s1[side], s2);
@@ -92,9 +92,9 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
             // estimate.
             const auto enough = hn::And(fewest >= one, most >= one + one);
             const V half_kick = hn::IfThenElseZero(enough, half * per_rad * sign * (after - before));
-            if (errors.middles) store(error + (error_whole - told_whole), errors.middle_fringes[i]);
+            if (errors.middles) store(error + (error_whole - whole_before), errors.middle_fringes[i]);
             const V here = error + half_kick;
-            store(here + (error_whole - told_whole), errors.fringes[i]);
+            store(here + (error_whole - whole_before), errors.fringes[i]);
             error = here + half_kick;
             // Whole fringes are put apart at every turn: bits must not depend on where a piece ends.
             const V carry = sm::nearest(d, error);

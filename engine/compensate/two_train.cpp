@@ -60,8 +60,8 @@ void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, Two
         V c2y = load(state.c2y);
         V error = load(state.error_fringes);
         V error_whole = load(state.error_whole);
-        const V told_whole = error_whole;
-        store(told_whole, errors.whole);
+        const V whole_before = error_whole;
+        store(whole_before, errors.whole);
         for (std::size_t i = 0; i < readings.turns; ++i) {
             const std::int64_t turn = readings.first_turn + static_cast<std::int64_t>(i);
             const bool minimum = readings.minimum(i);
@@ -80,7 +80,7 @@ void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, Two
             const V unit[2] = {minimum ? sum : difference, minimum ? difference : sum};
             if (errors.middles) {
                 const V middle = sm::fma(d, b[0], after_last[0], sm::fma(d, b[1], after_last[1], error));
-                store(middle + (error_whole - told_whole), errors.middle_fringes[i]);
+                store(middle + (error_whole - whole_before), errors.middle_fringes[i]);
             }
             V gained[2];
             for (std::size_t k = 0; k < 2; ++k) {
@@ -93,7 +93,7 @@ void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, Two
             const V carry = sm::nearest(d, error);
             error = error - carry;
             error_whole = error_whole + carry;
-            store(error + (error_whole - told_whole), errors.fringes[i]);
+            store(error + (error_whole - whole_before), errors.fringes[i]);
 
             if (minimum) {
                 const V fringes = load(readings.phase_fringes[i]);

@@ -250,7 +250,7 @@ void AtomicPath::give_new_name() {
 void AtomicPath::replace_found() {
     // Not under the partial name: the file that is exchanged for the target would get that name, and partial files are
     // removed.
-    const fs::path aside = move_beside();
+    const fs::path aside = move_to_free_path();
     if (aside.empty()) {
         if (std::rename(partial_.c_str(), target_.c_str()) != 0) fail(target_, errno);
         settled();
@@ -275,15 +275,15 @@ void AtomicPath::replace_found() {
 }
 
 /// Moves the partial file to a free name next to the target; empty where that fails.
-fs::path AtomicPath::move_beside() {
+fs::path AtomicPath::move_to_free_path() {
     constexpr int most = 1000;
     for (int number = 1; number <= most; ++number) {
-        fs::path beside = fmt::format("{}.ringlock-{}", target_.string(), number);
-        const int error = move_to_free_name(partial_, beside);
+        fs::path free_path = fmt::format("{}.ringlock-{}", target_.string(), number);
+        const int error = move_to_free_name(partial_, free_path);
         if (error == EEXIST) continue;
         if (error != 0) break;
         settled();
-        return beside;
+        return free_path;
     }
     return {};
 }
@@ -294,12 +294,12 @@ void AtomicPath::settled() {
 }
 
 void AtomicPath::refuse_to_replace(std::string_view what_happened) {
-    const fs::path beside = settled_ ? partial_ : move_beside();
-    if (!beside.empty()) note_written(beside);
+    const fs::path free_path = settled_ ? partial_ : move_to_free_path();
+    if (!free_path.empty()) note_written(free_path);
     throw RunError(fmt::format("cannot write {}: somebody has {} since this run began, and it is kept; {}",
                                printable(target_), what_happened,
-                               beside.empty() ? std::string("the new content could not be kept next to it")
-                                              : fmt::format("the new content is in {}", printable(beside))));
+                               free_path.empty() ? std::string("the new content could not be kept next to it")
+                                                 : fmt::format("the new content is in {}", printable(free_path))));
 }
 
 void write_text(const fs::path& path, std::string_view text) {

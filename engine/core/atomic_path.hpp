@@ -59,7 +59,7 @@ class AtomicPath {
     void give_name();
     void give_new_name();
     void replace_found();
-    std::filesystem::path move_beside();
+    std::filesystem::path move_to_free_path();
     void settled();
     [[noreturn]] void refuse_to_replace(std::string_view what_happened);
 

@@ -112,13 +112,13 @@ class BlockProgress {
     }
     void begin_again() {
         again_ = true;
-        already_ += told_;
-        told_ = 0;
+        already_ += reported_;
+        reported_ = 0;
     }
     void advance(std::int64_t gyros, std::int64_t turns, bool tabulated) {
         const std::int64_t again = std::min(already_, turns);
         already_ -= again;
-        told_ += turns - again;
+        reported_ += turns - again;
         if (monitor_.observer && (gyros > 0 || turns > again)) {
             monitor_.observer->advance(block_, gyros, turns - again, tabulated);
         }
@@ -134,8 +134,8 @@ class BlockProgress {
     std::size_t block_;
     BlockStage stage_ = BlockStage::set_up;
     bool again_ = false;
-    std::int64_t told_ = 0;     ///< since the last beginning
-    std::int64_t already_ = 0;  ///< reported before it and not gone through again so far
+    std::int64_t reported_ = 0;  ///< since the last beginning
+    std::int64_t already_ = 0;   ///< reported before it and not gone through again so far
 };
 
 void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,

@@ -106,10 +106,10 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
             V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
             V change_before = zero;
             if (growing && before_turns > 0) {
-                const auto told = gm::amplitude_after_swing(d, amplitude[0], last_amplitude, sign, before_turns);
-                change_before = told.amplitude - last_amplitude;
-                last_amplitude = told.amplitude;
-                cycle_gain = sm::fnma(d, told.rotation_less, per_rad + per_rad, cycle_gain);
+                const auto after = gm::amplitude_after_swing(d, amplitude[0], last_amplitude, sign, before_turns);
+                change_before = after.amplitude - last_amplitude;
+                last_amplitude = after.amplitude;
+                cycle_gain = sm::fnma(d, after.rotation_less, per_rad + per_rad, cycle_gain);
             }
             if (growing) amplitude[0] = amplitude[1] = last_amplitude;
             const V accel[2] = {amplitude[0] * load(known.w2_per_amplitude[direction][0]),
@@ -368,7 +368,7 @@ void FractionRecovery::recover(LaneReadings& readings, std::size_t first_row, st
     state_.turns += static_cast<std::int64_t>(last_row - first_row);
 }
 
-void FractionRecovery::tell(std::size_t lane, const Coupling& coupling) {
+void FractionRecovery::set_coupling(std::size_t lane, const Coupling& coupling) {
     devices_[lane].coupling.b_rad_s = coupling.b_rad_s;
     devices_[lane].coupling.phase_rad = coupling.phase_rad;
     make_tables(lane);

@@ -64,13 +64,13 @@ class FractionRecovery {
         double b_rad_s;
         double phase_rad;
     };
-    /// That of the tables.
-    Coupling told(std::size_t lane) const {
+    /// The coupling of the tables.
+    Coupling coupling_of_tables(std::size_t lane) const {
         return {devices_[lane].coupling.b_rad_s, devices_[lane].coupling.phase_rad};
     }
     /// Makes the tables anew for this coupling. Bends are linear about the coupling of their tables only, so the
     /// earlier ones are discarded.
-    void tell(std::size_t lane, const Coupling& coupling);
+    void set_coupling(std::size_t lane, const Coupling& coupling);
 
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
     std::int64_t contradictions(std::size_t lane) const {

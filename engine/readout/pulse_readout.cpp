@@ -148,14 +148,14 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
             const auto switched = distance[0][0] > zero;
             const V interval_s = (seen[1][0] - seen[0][0]) * tick_s;
             const V least_s = hn::Set(d, 2.0) * scale[1] * hn::Sqrt(least + least);
-            const auto told = hn::And(switched, hn::And(distance[1][0] > zero, interval_s > least_s));
+            const auto usable = hn::And(switched, hn::And(distance[1][0] > zero, interval_s > least_s));
             const V counted = hn::IfThenElse(switched, floor, floor + one);
 
             // Sampling: half-way between the nearest pulses that were distinguished, t_b and t_a, but for the
             // hysteresis, for which t_a^2 - t_b^2 is 4 h/a with times from the zero-rate point; these are proportional
             // to 1/sqrt(a), and sqrt(a) to the half cycle's angular frequency.
-            const V last = hn::IfThenElse(told, seen[0][0], seen[0][1]);
-            const V first = hn::IfThenElse(told, seen[1][0], seen[1][1]);
+            const V last = hn::IfThenElse(usable, seen[0][0], seen[0][1]);
+            const V first = hn::IfThenElse(usable, seen[1][0], seen[1][1]);
             const V share = before.w / (before.w + after.w);
             const V apart = (first - last) * tick_s;
             const V skew_s = (hysteresis + hysteresis) * scale[1] * scale[1] / apart;
@@ -217,7 +217,7 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
             for (std::size_t side = 0; side < 2; ++side) {
                 for (std::size_t pulse = 0; pulse < kept_pulses; ++pulse) {
                     V time_s = (seen[side][pulse] - latch) * tick_s;
-                    if (pulse == 0) time_s = hn::IfThenElseZero(told, time_s);
+                    if (pulse == 0) time_s = hn::IfThenElseZero(usable, time_s);
                     store(time_s, pulses.time_s[side][pulse][i]);
                 }
             }
@@ -239,9 +239,9 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
                 const V* of = seen[side];
                 const V near_interval = hn::Abs(of[1] - of[0]) * tick_s;
                 const V far_interval = hn::Abs(of[2] - of[1]) * tick_s;
-                store(acceleration_of(d, hn::IfThenElse(told, roots[0], roots[1]),
-                                      hn::IfThenElse(told, roots[1], roots[2]),
-                                      hn::IfThenElse(told, near_interval, far_interval)),
+                store(acceleration_of(d, hn::IfThenElse(usable, roots[0], roots[1]),
+                                      hn::IfThenElse(usable, roots[1], roots[2]),
+                                      hn::IfThenElse(usable, near_interval, far_interval)),
                       (side == 0 ? readings.accel_before_rad_s2 : readings.accel_after_rad_s2)[i]);
             }
         }

@@ -300,9 +300,9 @@ bool all_tables(const Scenario& s, Allows&& allows) {
     // exact.cpp.
     const double amplitude_rad =
         s.dither.peak_rate_deg_s * units::deg_h_per_deg_s / (s.gyro.scale_factor_arcsec * s.dither.frequency_hz);
-    const double told_width = 0.01 * std::max(std::abs(lowest), std::abs(highest)) + 16.0 * s.gyro.scale_factor_arcsec;
-    const double measured = varying_rate_deg_h(s) + 2.0 * told_width;
-    const double told = (1.0 + s.calibration.threshold_error_relative) * 1.02;
+    const double width = 0.01 * std::max(std::abs(lowest), std::abs(highest)) + 16.0 * s.gyro.scale_factor_arcsec;
+    const double measured = varying_rate_deg_h(s) + 2.0 * width;
+    const double threshold_factor = (1.0 + s.calibration.threshold_error_relative) * 1.02;
     const double wander_rad = amplitude_rad * amplitude_change_relative(s.dither, simulated_s(s));
     for (const bool noisy : {false, true}) {
         if (!driven[noisy] && !inverted[noisy]) continue;
@@ -314,7 +314,7 @@ bool all_tables(const Scenario& s, Allows&& allows) {
             !allows(Room{margin, change, lowest - room, highest + room, half_width, tabulated_coupling(s), true}))
             return false;
         if (inverted[noisy] &&
-            !allows(Room{wider, change, lowest - measured, highest + measured, told_width, told, false}))
+            !allows(Room{wider, change, lowest - measured, highest + measured, width, threshold_factor, false}))
             return false;
     }
     return true;

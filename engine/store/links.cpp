@@ -28,7 +28,9 @@ std::string file_of(hid_t object) {
 }
 
 /// Path of a file that another file names: relative to the folder of the latter, unless the name is absolute.
-fs::path beside(const std::string& file, const std::string& name) { return fs::path(file).parent_path() / name; }
+fs::path in_same_folder(const std::string& file, const std::string& name) {
+    return fs::path(file).parent_path() / name;
+}
 
 /// Opens the target of an external link, where that is allowed: only a regular file, for a FIFO would wait.
 hid_t open_external(hid_t group, const std::string& file, const std::string& object, hid_t access) {
@@ -36,7 +38,7 @@ hid_t open_external(hid_t group, const std::string& file, const std::string& obj
         refused = fmt::format("an external link leads to {} in another file, {}", printable(object), printable(file));
         return H5I_INVALID_HID;
     }
-    const fs::path path = beside(file_of(group), file);
+    const fs::path path = in_same_folder(file_of(group), file);
     std::error_code unreachable;
     if (!fs::is_regular_file(path, unreachable)) {
         refused = fmt::format("an external link leads to the file {}, which cannot be read", printable(path));
@@ -110,11 +112,11 @@ std::vector<std::string> virtual_files(std::int64_t creation) {
     return files;
 }
 
-bool is_readable_beside(std::int64_t object, const std::string& name) {
+bool is_readable_in_same_folder(std::int64_t object, const std::string& name) {
     // "%b" in a name stands for the number of a block: there may be any number of files of that form.
     if (name.find('%') != std::string::npos) return true;
     std::error_code unreachable;
-    return fs::is_regular_file(beside(file_of(object), name), unreachable);
+    return fs::is_regular_file(in_same_folder(file_of(object), name), unreachable);
 }
 
 }  // namespace ringlock::store::detail

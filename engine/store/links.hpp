@@ -19,6 +19,6 @@ std::vector<std::string> external_files(std::int64_t creation);
 std::vector<std::string> virtual_files(std::int64_t creation);
 
 /// Whether a file of that name lies in the folder of the file that holds the object.
-bool is_readable_beside(std::int64_t object, const std::string& name);
+bool is_readable_in_same_folder(std::int64_t object, const std::string& name);
 
 }  // namespace ringlock::store::detail

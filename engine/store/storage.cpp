@@ -65,7 +65,7 @@ class StorageCheck {
                             how, fmt::join(names, ", ")));
         }
         for (const std::string& other : files) {
-            if (!detail::is_readable_beside(dataset_, other)) {
+            if (!detail::is_readable_in_same_folder(dataset_, other)) {
                 fail(fmt::format("{} the file {}, which does not exist or is not a regular file", how,
                                  printable(other)));
             }

@@ -91,8 +91,8 @@ double sum_of_mirrored(const double* HWY_RESTRICT p, const double* HWY_RESTRICT 
     const double far_cut = sum_of(lower, [&](std::size_t i) { return at[i] * *(to - i); });
     at = p + first + length;
     to = chain + first;
-    const double* beside = p + first;
-    const double far = sum_of(starts, [&](std::size_t i) { return at[i] * (2.0 * to[i] + beside[i]); });
+    const double* next = p + first;
+    const double far = sum_of(starts, [&](std::size_t i) { return at[i] * (2.0 * to[i] + next[i]); });
     return (near - far) + 2.0 * (near_cut - far_cut);
 }
 

@@ -35,7 +35,7 @@ std::vector<ChainRate> ranked(const RateTable& table) {
     std::stable_sort(rates.begin(), rates.end(), [](const ChainRate& a, const ChainRate& b) { return a.sum > b.sum; });
     if (rates.empty()) return rates;
     const ChainRate likeliest = rates.front();
-    const double told_up_to_hz = options.samples.contest.told_up_to * table.record_rate_hz;
+    const double distinguished_up_to_hz = options.samples.contest.distinguished_up_to * table.record_rate_hz;
     const auto pattern_hz = [&](double hz) { return alias(hz, table.record_rate_hz).hz; };
     for (ChainRate& rate : rates) {
         for (std::size_t r = 0; r < rate.log_likelihood.size(); ++r) {
@@ -43,7 +43,7 @@ std::vector<ChainRate> ranked(const RateTable& table) {
         }
         rate.sum -= likeliest.sum;
         const bool same = same_source(pattern_hz(rate.hz), pattern_hz(likeliest.hz), table.record_rate_hz);
-        const bool beyond = same && rate.hz > told_up_to_hz && likeliest.hz > told_up_to_hz;
+        const bool beyond = same && rate.hz > distinguished_up_to_hz && likeliest.hz > distinguished_up_to_hz;
         rate.tied = &rate != &rates.front() && (beyond || -rate.sum < options.tie);
     }
     return rates;

@@ -19,7 +19,7 @@ Naming name_among(const std::vector<EffectSet>& tied, const std::function<bool(c
         const effects::Effect* effect = best.effects[k];
         if (sets_with(effect) > sets_with(naming.named) && may_lead(effect)) naming.named = effect;
     }
-    naming.alternatives.push_back({naming.named, best.merit});
+    naming.alternatives.push_back({naming.named, best.evidence});
     for (const effects::Effect* effect : best.effects) {
         if (effect != naming.named) naming.partners.push_back(effect);
     }
@@ -30,7 +30,7 @@ Naming name_among(const std::vector<EffectSet>& tied, const std::function<bool(c
                 std::find_if(naming.alternatives.begin(), naming.alternatives.end(),
                              [&](const Naming::Alternative& alternative) { return alternative.effect == effect; });
             if (!best.has(effect) && known == naming.alternatives.end()) {
-                naming.alternatives.push_back({effect, set.merit});
+                naming.alternatives.push_back({effect, set.evidence});
             }
         }
     }

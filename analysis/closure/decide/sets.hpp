@@ -11,7 +11,7 @@ namespace ringlock::closure {
 /// Effects that explain the record together.
 struct EffectSet {
     std::vector<const effects::Effect*> effects;
-    double merit = 0.0;  ///< evidence: log-likelihood gain less the cost of parameters and search [nats]
+    double evidence = 0.0;  ///< evidence: log-likelihood gain less the cost of parameters and search [nats]
 
     bool has(const effects::Effect* effect) const;
 };
@@ -21,7 +21,7 @@ struct Naming {
     /// An effect and the evidence of the set that it belongs to.
     struct Alternative {
         const effects::Effect* effect = nullptr;
-        double merit = 0.0;
+        double evidence = 0.0;
     };
     const effects::Effect* named = nullptr;
     std::vector<const effects::Effect*> partners;  ///< other members of the best set, to be added next

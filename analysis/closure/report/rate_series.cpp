@@ -110,7 +110,7 @@ std::vector<double> determined_rates(const record::Record& record, const Closure
 }
 
 NearLine spectrum_near(const RateSeries& rates, double hz) {
-    constexpr int resolutions = options.report.resolutions_beside_line;
+    constexpr int resolutions = options.report.resolutions_around_line;
     constexpr int points_each = options.report.points_a_resolution;
     NearLine near;
     const std::size_t n = rates.rate_deg_h.size();

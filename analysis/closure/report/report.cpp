@@ -74,7 +74,7 @@ nlohmann::json to_json(const Closure& closure) {
     object["tests"] = json::array();
     for (const ResidualTest& test : closure.tests) {
         object["tests"].push_back({{"where", name_of(test.where)},
-                                   {"view", test.view},
+                                   {"view", test.subject},
                                    {"p_value", number(test.p_value)},
                                    {"detail", test.detail}});
     }
@@ -136,7 +136,7 @@ std::string to_text(const Closure& closure) {
     line("");
     line("tests of the residual:");
     for (const ResidualTest& test : closure.tests) {
-        line(fmt::format("  {:<11} {:<62} p {}", name_of(test.where), test.view, probability(test.p_value)));
+        line(fmt::format("  {:<11} {:<62} p {}", name_of(test.where), test.subject, probability(test.p_value)));
     }
     for (const std::string& note : closure.notes) line("note: " + note);
     return text;

@@ -66,8 +66,8 @@ double CountChain::forward(double p) {
         double sum = 0.0;
         for (std::size_t to = 0; to < quarters; ++to) {
             const std::size_t from = (to + quarters - step_[i]) % quarters;
-            const double foretold = i == 0 ? 1.0 / quarters : (1.0 - p) * now[to] + p * now[from];
-            next[to] = foretold * seen_[i][to];
+            const double predicted = i == 0 ? 1.0 / quarters : (1.0 - p) * now[to] + p * now[from];
+            next[to] = predicted * seen_[i][to];
             sum += next[to];
         }
         for (double& chance : next) chance /= sum;
@@ -77,7 +77,7 @@ double CountChain::forward(double p) {
     return log_likelihood;
 }
 
-std::vector<std::int64_t> CountChain::likeliest_course(double p) const {
+std::vector<std::int64_t> CountChain::likeliest_path(double p) const {
     // Probabilities of steps of 0 to 3 quarters in the direction of the phase; three are one against the direction.
     const double chances[quarters] = {1.0 - p, p, options.stats.count_chain.two_at_once * p,
                                       options.stats.count_chain.against_direction * p};
@@ -100,8 +100,8 @@ std::vector<std::int64_t> CountChain::likeliest_course(double p) const {
         }
         cost = next;
     }
-    std::vector<std::int64_t> course(n);
-    if (n == 0) return course;
+    std::vector<std::int64_t> path(n);
+    if (n == 0) return path;
     auto at = static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
     std::vector<std::int64_t> steps(n);
     for (std::size_t i = n; i-- > 1;) {
@@ -110,9 +110,9 @@ std::vector<std::int64_t> CountChain::likeliest_course(double p) const {
         steps[i] = way * (taken == quarters - 1 ? -1 : static_cast<std::int64_t>(taken));
         at = (at + quarters * step_[i] - taken * step_[i]) % quarters;
     }
-    course[0] = static_cast<std::int64_t>(at);
-    for (std::size_t i = 1; i < n; ++i) course[i] = course[i - 1] + steps[i];
-    return course;
+    path[0] = static_cast<std::int64_t>(at);
+    for (std::size_t i = 1; i < n; ++i) path[i] = path[i - 1] + steps[i];
+    return path;
 }
 
 }  // namespace ringlock::closure

@@ -38,7 +38,7 @@ class CountChain {
     /// The most probable path of the number of lost quarters, turn by turn (Viterbi, IEEE Transactions on Information
     /// Theory 13, 1967, 260), from between 0 and 3 at the first turn. Steps against the direction, and of two quarters,
     /// are possible with far smaller probabilities.
-    std::vector<std::int64_t> likeliest_course(double p) const;
+    std::vector<std::int64_t> likeliest_path(double p) const;
 
    private:
     double forward(double p);

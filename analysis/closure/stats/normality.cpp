@@ -100,7 +100,7 @@ std::optional<Jump> largest_jump(const std::vector<double>& innovations, const R
         part += response[middle + jump.length] * response[middle + jump.length];
         ++jump.length;
     }
-    const std::size_t stride = std::max<std::size_t>(1, jump.length / of.places_per_length);
+    const std::size_t stride = std::max<std::size_t>(1, jump.length / of.positions_per_length);
     for (std::size_t a = 0; a + jump.length <= n; a += stride) {
         double sum = 0.0;
         double weight = 0.0;
@@ -111,17 +111,17 @@ std::optional<Jump> largest_jump(const std::vector<double>& innovations, const R
             weight += h * h;
         }
         if (!(weight > of.share_counted * part)) continue;
-        jump.places += 1.0;
+        jump.positions += 1.0;
         if (sum * sum / weight <= jump.chi2) continue;
         jump.chi2 = sum * sum / weight;
         jump.row = a;
     }
-    if (jump.places < of.fewest_places) return std::nullopt;
+    if (jump.positions < of.fewest_positions) return std::nullopt;
     return jump;
 }
 
 ResidualTest test_of(const Jump& jump) {
-    return {Where::time, "jumps of a rate that wanders", of_several(chi2_tail(jump.chi2, 1), jump.places),
+    return {Where::time, "jumps of a rate that wanders", of_several(chi2_tail(jump.chi2, 1), jump.positions),
             fmt::format("{:.1f} standard errors", std::sqrt(jump.chi2))};
 }
 

@@ -26,7 +26,7 @@ bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows
 struct Jump {
     std::size_t row = 0;
     double chi2 = 0.0;
-    double places = 0.0;     ///< number of places that were tried
+    double positions = 0.0;  ///< number of places that were tried
     std::size_t length = 0;  ///< rows that contain most of the response to a step
 };
 /// \param response  response of the filter to a step of the rate in the middle of the record

@@ -21,14 +21,14 @@ double cost_of_amplitudes(double gain, int amplitudes) {
     return 2.0 * gain > k ? 0.5 * k * (1.0 + std::log(2.0 * gain / k)) : std::max(gain, 0.0);
 }
 
-double davies_places(double chi2, const std::vector<double>& roots) {
+double davies_look_elsewhere(double chi2, const std::vector<double>& roots) {
     double variation = 0.0;
     for (std::size_t i = 1; i < roots.size(); ++i) variation += std::abs(roots[i] - roots[i - 1]);
     // V u^((s-1)/2) exp(-u/2) 2^(-s/2)/Gamma(s/2) over (u/2)^(s/2-1) exp(-u/2)/Gamma(s/2), the tail of s degrees.
     return 1.0 + 0.5 * variation * std::sqrt(std::max(chi2, 0.0));
 }
 
-double places_of_step(double chi2, double share_at_ends) {
+double look_elsewhere_of_step(double chi2, double share_at_ends) {
     const double b = std::sqrt(std::max(chi2, 1.0));
     const double density = std::exp(-0.5 * b * b) / std::sqrt(units::two_pi);
     const double range = 2.0 * std::log((1.0 - share_at_ends) / share_at_ends);
@@ -36,12 +36,12 @@ double places_of_step(double chi2, double share_at_ends) {
     return std::max(1.0, p / chi2_tail(b * b, 1));
 }
 
-double places_of_frequency(double chi2, double cycles) {
+double look_elsewhere_of_frequency(double chi2, double cycles) {
     return std::max(1.0, std::sqrt(units::pi / 3.0) * cycles * std::sqrt(0.5 * std::max(chi2, 0.0)));
 }
 
 double davies_bound(double chi2, const std::vector<double>& roots, int freedom) {
-    return std::min(1.0, chi2_tail(chi2, freedom) * davies_places(chi2, roots));
+    return std::min(1.0, chi2_tail(chi2, freedom) * davies_look_elsewhere(chi2, roots));
 }
 
 }  // namespace ringlock::closure

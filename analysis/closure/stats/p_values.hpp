@@ -23,15 +23,15 @@ double cost_of_amplitudes(double gain, int amplitudes);
 /// The number of independent positions that a search for a step anywhere in white noise is worth at this chi-squared,
 /// except in that share of the record at either end: the probability of the maximum of a standardised Brownian bridge
 /// (Miller and Siegmund, Biometrics 38, 1982, 1011) over that at one place.
-double places_of_step(double chi2, double share_at_ends);
+double look_elsewhere_of_step(double chi2, double share_at_ends);
 
 /// The same for a line with this chi-squared of its two amplitudes, over that number of cycles a record of frequency:
 /// the expected number of crossings of a chi-squared process (Davies 1987; Baluev, Mon. Not. R. Astron. Soc. 385, 2008,
 /// 1279) over the probability at one place.
-double places_of_frequency(double chi2, double cycles);
+double look_elsewhere_of_frequency(double chi2, double cycles);
 
 /// davies_bound over the p-value at one place: the number of independent positions that the search is worth, for any
 /// number of degrees of freedom.
-double davies_places(double chi2, const std::vector<double>& roots);
+double davies_look_elsewhere(double chi2, const std::vector<double>& roots);
 
 }  // namespace ringlock::closure

@@ -47,14 +47,14 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
                 if (changes == 0) continue;
                 const double chi2 = new_product * new_product / new_squares;
                 const double cost = of_levels + changes * place;
-                const double merit = 0.5 * chi2 - cost;
-                if (!(merit > step.merit)) continue;
-                step = {chi2, changes, merit, cost};
+                const double evidence = 0.5 * chi2 - cost;
+                if (!(evidence > step.evidence)) continue;
+                step = {chi2, changes, evidence, cost};
                 from = a;
                 to = b;
             }
         }
-        if (!(step.merit > best.merit + gained * std::abs(best.merit))) break;
+        if (!(step.evidence > best.evidence + gained * std::abs(best.evidence))) break;
         best = step;
         for (Eigen::Index k = from; k <= to; ++k) {
             high[static_cast<std::size_t>(k)] ^= 1;
@@ -63,10 +63,10 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
     }
     if (best.changes == 0) return {};
     const auto changes = static_cast<unsigned>(best.changes);
-    const double courses = boost::math::binomial_coefficient<double>(static_cast<unsigned>(n - 1), changes) *
-                           std::exp2(static_cast<double>(changes));
+    const double paths = boost::math::binomial_coefficient<double>(static_cast<unsigned>(n - 1), changes) *
+                         std::exp2(static_cast<double>(changes));
     best.shape = shape;
-    best.p_value = of_several(chi2_tail(best.chi2, 1), courses);
+    best.p_value = of_several(chi2_tail(best.chi2, 1), paths);
     return best;
 }
 

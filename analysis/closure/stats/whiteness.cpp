@@ -26,10 +26,10 @@ Correlations correlations_of(const std::vector<double>& innovations, const Rows&
     return found;
 }
 
-ResidualTest Correlations::test(Where where, std::string view) const {
+ResidualTest Correlations::test(Where where, std::string subject) const {
     double chi2 = 0.0;
     for (const double r : root) chi2 += r * r;
-    return {where, std::move(view), chi2_tail(chi2, static_cast<int>(root.size()) - 1),
+    return {where, std::move(subject), chi2_tail(chi2, static_cast<int>(root.size()) - 1),
             fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])};
 }
 

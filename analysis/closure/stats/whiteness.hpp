@@ -14,7 +14,7 @@ namespace ringlock::closure {
 struct Correlations {
     std::array<double, options.stats.lags + 1> root{};  ///< by lag; zero at lag 0
 
-    ResidualTest test(Where where, std::string view) const;
+    ResidualTest test(Where where, std::string subject) const;
 };
 Correlations correlations_of(const std::vector<double>& innovations, const Rows& rows);
 

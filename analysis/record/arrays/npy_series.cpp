@@ -25,7 +25,7 @@ namespace ringlock::record {
 namespace {
 
 /// The name that numpy.savez gives to an array without one.
-constexpr std::string_view nameless = "arr_0";
+constexpr std::string_view unnamed_array = "arr_0";
 
 class FileSource final : public ByteSource {
    public:
@@ -198,16 +198,16 @@ SeriesInfo stream_archive(const SeriesRequest& request, const TakePiece& take) {
 /// The array of a .npy file has no name of its own: a request may be brackets alone or begin with the name of the file.
 std::optional<std::string> named_array(const std::optional<std::string>& asked, const std::string& path) {
     if (!asked) return asked;
-    if (asked->starts_with('[')) return std::string(nameless) + *asked;
+    if (asked->starts_with('[')) return std::string(unnamed_array) + *asked;
     const std::string stem = std::filesystem::path(path).stem().string();
     if (*asked != stem && !asked->starts_with(stem + "[") && !asked->starts_with(stem + "/")) return asked;
-    return std::string(nameless) + asked->substr(stem.size());
+    return std::string(unnamed_array) + asked->substr(stem.size());
 }
 
 }  // namespace
 
 SeriesInfo stream_npy_series(const SeriesRequest& request, const TakePiece& take) {
-    const std::string name = fmt::format("/{}", nameless);
+    const std::string name = fmt::format("/{}", unnamed_array);
     const std::string where = printable(request.path);
     FileSource source(request.path);
     const NpyHeader head = header_of(source, where);

@@ -17,7 +17,7 @@ namespace ringlock::study {
 
 namespace {
 
-constexpr double told_quantiles[] = {0.05, 0.5, 0.95};
+constexpr double reported_quantiles[] = {0.05, 0.5, 0.95};
 
 template <class What>
 std::vector<double> of_gyros(const ArmStatistics& arm, What&& what) {
@@ -70,7 +70,7 @@ std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm)
     std::vector<LotFigure> figures;
     for (LotValues& figure : lot_values(study, arm)) {
         figures.push_back(
-            {std::move(figure.name), lot::quantiles(figure.values, told_quantiles, confidence_of(study.scenario))});
+            {std::move(figure.name), lot::quantiles(figure.values, reported_quantiles, confidence_of(study.scenario))});
     }
     return figures;
 }

@@ -491,8 +491,8 @@ void refuse_before_parsing(std::string_view text, std::string_view name) {
             blank = true;
             comment = false;
         }
-        const bool beside = c == '.' && i > 0 && text[i - 1] == '.';
-        if (comment || beside || std::string_view("\n=,{}[]").find(c) != std::string_view::npos) {
+        const bool second_point = c == '.' && i > 0 && text[i - 1] == '.';
+        if (comment || second_point || std::string_view("\n=,{}[]").find(c) != std::string_view::npos) {
             dots = 0;
         } else if (c == '.' && ++dots > most) {
             throw InputError(

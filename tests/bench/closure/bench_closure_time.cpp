@@ -25,7 +25,7 @@
 #include "analysis/closure/turns/fit/fit.hpp"
 #include "analysis/closure/turns/loop/loop.hpp"
 #include "analysis/closure/turns/model/series.hpp"
-#include "analysis/closure/turns/residual/views.hpp"
+#include "analysis/closure/turns/residual/residual_tests.hpp"
 #include "analysis/closure/turns/screen/score_tests.hpp"
 #include "analysis/closure/turns/screen/side_channels.hpp"
 #include "analysis/record/record.hpp"
@@ -93,33 +93,33 @@ std::string answer_of(const Closure& closure) {
     return closure.verdict == ringlock::closure::Verdict::closed ? text : text + ", unexplained";
 }
 
-void time_loops(std::vector<Contender>& contenders, const std::vector<std::size_t>& lengths, int rounds) {
+void time_loops(std::vector<Contender>& finalists, const std::vector<std::size_t>& lengths, int rounds) {
     for (int round = 0; round < rounds; ++round) {
         for (const std::size_t length : lengths) {
-            for (Contender& contender : contenders) {
-                const record::Record made = contender.made(length);
+            for (Contender& finalist : finalists) {
+                const record::Record made = finalist.made(length);
                 Closure closure;
-                contender.times.add(length, seconds_of([&] { closure = ringlock::closure::close_loop(made); }));
-                contender.answers[length] = answer_of(closure);
+                finalist.times.add(length, seconds_of([&] { closure = ringlock::closure::close_loop(made); }));
+                finalist.answers[length] = answer_of(closure);
             }
         }
     }
 }
 
 /// Rows: record and length.
-std::string loops_table(const std::vector<Contender>& contenders, const std::vector<std::size_t>& lengths,
+std::string loops_table(const std::vector<Contender>& finalists, const std::vector<std::size_t>& lengths,
                         const std::string& unit) {
     std::string text = fmt::format(
         "| in the record | {0}s | answer | seconds | longest of the rounds | per {0}, over {1} {0}s | per {0}, over "
         "the "
         "row above |\n|---|---|---|---|---|---|---|\n",
         unit, lengths.front());
-    for (const Contender& contender : contenders) {
+    for (const Contender& finalist : finalists) {
         for (std::size_t k = 0; k < lengths.size(); ++k) {
             const std::size_t length = lengths[k];
-            const Times& times = contender.times;
-            text += fmt::format("| {} | {} | {} | {} | {:.2f} | {:.2f} | {} |\n", contender.name, length,
-                                contender.answers.at(length), times.seconds(length), times.worst(length),
+            const Times& times = finalist.times;
+            text += fmt::format("| {} | {} | {} | {} | {:.2f} | {:.2f} | {} |\n", finalist.name, length,
+                                finalist.answers.at(length), times.seconds(length), times.worst(length),
                                 times.growth(length, lengths.front()),
                                 k > 0 ? fmt::format("{:.2f}", times.growth(length, lengths[k - 1])) : "");
         }
@@ -207,7 +207,7 @@ std::string time_stages(const std::vector<std::size_t>& lengths, int rounds) {
             stage(0, [&] { fit = std::make_unique<closure::TurnFit>(model, start, closure::Rows(series.size(), 1)); });
             stage(1, [&] { closure::screen(*fit); });
             stage(2, [&] { closure::screen_side_channels(*made.turns, *fit, joined); });
-            stage(3, [&] { closure::view_residual(*fit); });
+            stage(3, [&] { closure::test_residual(*fit); });
             stage(4, [&] { closed = closure::close_turns(made); });
             stage(5, [&] { simulations[length] = closure::check_predictive(made, closed).simulations; });
         }

@@ -34,7 +34,7 @@ TEST(Naming, OneSetNamesItsEffect) {
     EXPECT_EQ(naming.named, effect("bias_ramp"));
     EXPECT_THAT(naming.partners, IsEmpty());
     ASSERT_EQ(naming.alternatives.size(), 1U);
-    EXPECT_DOUBLE_EQ(naming.alternatives[0].merit, 30.0);
+    EXPECT_DOUBLE_EQ(naming.alternatives[0].evidence, 30.0);
 }
 
 TEST(Naming, AnotherEffectThatExplainsAsMuchIsConfounded) {
@@ -42,7 +42,7 @@ TEST(Naming, AnotherEffectThatExplainsAsMuchIsConfounded) {
         name_among({{{effect("bias_ramp")}, 30.0}, {{effect("rate_random_walk")}, 28.0}}, any_may_lead);
     EXPECT_EQ(naming.named, effect("bias_ramp"));
     EXPECT_THAT(confounded(naming), ElementsAre("rate_random_walk"));
-    EXPECT_DOUBLE_EQ(naming.alternatives[1].merit, 28.0);
+    EXPECT_DOUBLE_EQ(naming.alternatives[1].evidence, 28.0);
 }
 
 TEST(Naming, ASetThatHasTheNamedEffectIsNoAlternative) {
@@ -77,7 +77,7 @@ TEST(Naming, AnAlternativeIsListedOnceWithItsBestSet) {
                                          {{effect("rate_random_walk")}, 27.0}};
     const Naming naming = name_among(tied, any_may_lead);
     EXPECT_THAT(confounded(naming), ElementsAre("rate_random_walk", "bias_step"));
-    EXPECT_DOUBLE_EQ(naming.alternatives[1].merit, 29.0);
+    EXPECT_DOUBLE_EQ(naming.alternatives[1].evidence, 29.0);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/samples/fit/score.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
-#include "analysis/closure/samples/rounded/summit.hpp"
+#include "analysis/closure/samples/rounded/maximum.hpp"
 #include "analysis/closure/samples/rounded/unrounding.hpp"
 #include "tests/closure/generator/samples.hpp"
 #include "tests/closure/heldout.hpp"
@@ -59,7 +59,7 @@ TEST(RoundedReadings, AreDrawnWithinTheirStepsAsNormalAsTheirModel) {
     const Rows rows(series.size(), 1);
     const std::vector<double> rounded = series.increment;
     const SampleFit fit = true_fit(truth, series, rows);
-    series.increment = ringlock::closure::unround(fit, {rounded, step_arcsec, 128}, 1);
+    series.increment = ringlock::closure::impute(fit, {rounded, step_arcsec, 128}, 1);
     double off = 0.0;
     double least = 0.0;
     double most = 0.0;
@@ -88,14 +88,14 @@ TEST(RoundedReadings, AreForetoldWithTheSpreadThatIsSaid) {
     const SampleSeries series = ringlock::closure::prepare_samples(generate_samples(truth));
     const Rows rows(series.size(), 1);
     const SampleFit fit = true_fit(truth, series, rows);
-    const auto foretold = ringlock::closure::foretell_rounded(fit, {series.increment, step_arcsec, 128});
+    const auto predicted = ringlock::closure::predict_rounded(fit, {series.increment, step_arcsec, 128});
     double squares = 0.0;
     double variance = 0.0;
     double log_probability = 0.0;
     for (std::size_t i = 0; i < series.size(); ++i) {
-        squares += std::pow(series.increment[i] - foretold.mean[i], 2);
-        variance += foretold.variance[i];
-        log_probability += foretold.log_probability[i] - std::log(step_arcsec);
+        squares += std::pow(series.increment[i] - predicted.mean[i], 2);
+        variance += predicted.variance[i];
+        log_probability += predicted.log_probability[i] - std::log(step_arcsec);
     }
     const SampleFit linear(series, SampleModel{}, rows);
     EXPECT_NEAR(squares / variance, 1.0, 0.08);
@@ -139,12 +139,12 @@ TEST(LongRoundedReadings, AreLikeliestWhereTheNoiseIs) {
         model.noise.angle_arcsec *= 1.6;
         model.noise.rate_arcsec_rt_s *= 2.0;
         const SampleFit off(series, std::move(model), rows, SampleFit::Noise::all_held);
-        const auto summit = towards_summit(off, {series.increment, step_arcsec, 64}, series.size(), 8);
-        ASSERT_EQ(summit.noise_log_sd.size(), 2U);
-        EXPECT_NEAR(summit.noise_log_sd[0], 0.0165, 0.004);  // second differences of the log-likelihood
-        const auto& noise = summit.model.noise;
-        angle += std::pow(std::log(noise.angle_arcsec / exact.angle_arcsec) / summit.noise_log_sd[0], 2);
-        rate += std::pow(std::log(noise.rate_arcsec_rt_s / exact.rate_arcsec_rt_s) / summit.noise_log_sd[1], 2);
+        const auto maximum = towards_maximum(off, {series.increment, step_arcsec, 64}, series.size(), 8);
+        ASSERT_EQ(maximum.noise_log_sd.size(), 2U);
+        EXPECT_NEAR(maximum.noise_log_sd[0], 0.0165, 0.004);  // second differences of the log-likelihood
+        const auto& noise = maximum.model.noise;
+        angle += std::pow(std::log(noise.angle_arcsec / exact.angle_arcsec) / maximum.noise_log_sd[0], 2);
+        rate += std::pow(std::log(noise.rate_arcsec_rt_s / exact.rate_arcsec_rt_s) / maximum.noise_log_sd[1], 2);
     }
     // Chi squared of eight degrees of freedom, one in ten thousand
     EXPECT_LT(angle, 31.8);

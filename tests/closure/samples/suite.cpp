@@ -372,7 +372,7 @@ TEST(SampleSteps, AreCountedAsABrownianBridge) {
         }
         above += most > chi2 ? 1 : 0;
     }
-    const double p = ringlock::closure::chi2_tail(chi2, 1) * ringlock::closure::places_of_step(chi2, ends);
+    const double p = ringlock::closure::chi2_tail(chi2, 1) * ringlock::closure::look_elsewhere_of_step(chi2, ends);
     EXPECT_LT(above, records * p + 3.0 * std::sqrt(records * p));
     EXPECT_GT(above, 0.7 * records * p);
 }
@@ -412,7 +412,7 @@ TEST(SampleLines, OfStrongOnesTheStrongestIsTheLikeliest) {
     std::normal_distribution<double> normal;
     std::vector<double> values(30000);
     const auto phase = ringlock::closure::line_phase(values.size(), rate_hz,
-                                                     ringlock::closure::LineCourse::even(37.56, drift_hz_per_s));
+                                                     ringlock::closure::FrequencyTrack::even(37.56, drift_hz_per_s));
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = normal(random) + 5.0 * std::cos(phase[i]);
     const auto lines = ringlock::closure::find_lines(values, rate_hz);
     ASSERT_EQ(lines.still.p_value, 0.0);
@@ -423,10 +423,10 @@ TEST(SampleLines, OfStrongOnesTheStrongestIsTheLikeliest) {
 // Through power that pieces of the record have, with the phase lost from one to the next: the course is found to
 // 0.03 cycles everywhere, by as many coefficients as that takes.
 TEST(SampleLines, AreFollowedOnACurve) {
-    using ringlock::closure::LineCourse;
+    using ringlock::closure::FrequencyTrack;
     constexpr double rate_hz = 100.0;
     constexpr std::size_t n = 60000;
-    const LineCourse truth{37.56, {6e-4, -3e-6, 1.5e-8, -6e-11, 2e-13}, 6};
+    const FrequencyTrack truth{37.56, {6e-4, -3e-6, 1.5e-8, -6e-11, 2e-13}, 6};
     std::mt19937_64 random(6);
     std::normal_distribution<double> normal;
     const auto phase = ringlock::closure::line_phase(n, rate_hz, truth);
@@ -437,11 +437,11 @@ TEST(SampleLines, AreFollowedOnACurve) {
     // Half the values over 1.5, the variance with the line in it
     EXPECT_NEAR(found.chi2, 0.5 * n / 1.5, 3.0 * std::sqrt(2.0 * n));
     const auto off = [&](double t) {
-        const double turns = found.course.turns(t) - truth.turns(t);
+        const double turns = found.track.turns(t) - truth.turns(t);
         return turns - std::round(turns);
     };
     for (double t = -295.0; t <= 295.0; t += 5.0) EXPECT_NEAR(off(t), 0.0, 0.03) << t;
-    EXPECT_GT(found.course.free, 3U);
+    EXPECT_GT(found.track.free, 3U);
 }
 
 // By how many places the search over curves is counted: in noise alone what it finds is not rare.
@@ -456,7 +456,7 @@ TEST(LongSampleLines, SearchesOverCurvesAreCounted) {
         lines.scattered_hz = 10.0 + k;
         const auto found = ringlock::closure::follow_bends(values, rate_hz, lines);
         const double cycles = 0.5 * static_cast<double>(values.size());
-        const double places = ringlock::closure::places_of_bends(found.chi2, cycles, found.course.free);
+        const double places = ringlock::closure::look_elsewhere_of_track(found.chi2, cycles, found.track.free);
         EXPECT_GT(ringlock::closure::of_several(ringlock::closure::chi2_tail(found.chi2, 2), places), 0.01);
     }
 }

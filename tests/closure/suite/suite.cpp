@@ -3,29 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
-#include <chrono>
 #include <cmath>
-#include <initializer_list>
-#include <limits>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "analysis/closure/options.hpp"
-#include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/turns/loop/loop.hpp"
 #include "analysis/closure/turns/model/model.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
-#include "engine/gyro/theory.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/text/parse.hpp"
 #include "tests/closure/generator/generator.hpp"
 #include "tests/closure/generator/keys.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"
+#include "tests/closure/suite/device.hpp"
 
 namespace ringlock::test::closure {
 
@@ -33,7 +26,6 @@ using ringlock::closure::ActiveEffect;
 using ringlock::closure::Closure;
 using ringlock::closure::Estimate;
 using ringlock::closure::fit_turns;
-using ringlock::closure::Verdict;
 using ringlock::closure::Where;
 
 const std::vector<Condition> conditions = {
@@ -67,84 +59,10 @@ std::string Case::truth_text() const { return text_of(added()); }
 
 namespace {
 
-constexpr double nominal_threshold_deg_h = 300.0;
 constexpr double temperature_swing_k = 1.0;
 constexpr double temperature_interval_s = 0.1;  // between rows the temperature is taken for linear
 constexpr double walk_relative_rt_s = 1e-5;
 constexpr double drift_relative_per_h = 0.01;
-
-/// Truths of the gyro itself, by the seed.
-struct Device {
-    double threshold_deg_h, peak_rate_deg_s, rate_deg_h;
-    double declared_threshold_deg_h = nominal_threshold_deg_h;
-    double injected_rad = 0.0;
-    double readout_noise = 0.005;
-    double scale_factor_arcsec = Truth{}.scale_factor_arcsec;
-    double dither_frequency_hz = Truth{}.dither_frequency_hz;
-    double duration_s = 0.0;
-    std::vector<double> profile_time_s = {};
-    std::vector<double> profile_rate_deg_h = {};
-};
-
-/// Kicks up to this are those of gyros that are built.
-void draw_other(Device& d, std::mt19937_64& random) {
-    constexpr double largest_kick_rad = 0.4;
-    constexpr double least_fringes = 110.0;  // in a half cycle, for the turn map
-    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
-    const auto one_of = [&](std::initializer_list<double> all) {
-        return all.begin()[std::uniform_int_distribution<std::size_t>(0, all.size() - 1)(random)];
-    };
-    gyro::Setup setup;
-    do {
-        setup.scale_factor_arcsec = one_of({0.3, 0.5, 0.8, 1.2, 2.0, 3.0});
-        setup.dither_frequency_hz = even(110.0, 600.0);
-        setup.dither_peak_rate_deg_s = even(40.0, 300.0);
-        setup.lockin_threshold_deg_h = even(40.0, 1500.0);
-    } while (gyro::turn_kick_rad(setup) > largest_kick_rad ||
-             units::arcsec_per_deg * setup.dither_peak_rate_deg_s <
-                 least_fringes * units::pi * setup.scale_factor_arcsec * setup.dither_frequency_hz);
-    d.scale_factor_arcsec = setup.scale_factor_arcsec;
-    d.dither_frequency_hz = setup.dither_frequency_hz;
-    d.peak_rate_deg_s = setup.dither_peak_rate_deg_s;
-    d.threshold_deg_h = setup.lockin_threshold_deg_h;
-    d.declared_threshold_deg_h = d.threshold_deg_h * between(0.7, 1.3);
-    d.readout_noise = one_of({0.001, 0.005, 0.02});
-    d.injected_rad = one_of({0.0, 0.0, 0.5, 1.5, 3.0});
-    if (between(0.0, 1.0) < 1.0 / 3.0) d.rate_deg_h = between(-1.0, 1.0);  // at rest, its bias alone
-}
-
-Device device_of(const Case& of) {
-    std::mt19937_64 random(of.seed);
-    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    const double threshold_deg_h = of.gyro ? of.gyro->lockin_threshold_deg_h : nominal_threshold_deg_h;
-    const double peak_rate_deg_s = of.gyro ? of.gyro->dither_peak_rate_deg_s : 109.1;
-    Device d{threshold_deg_h * between(0.8, 1.2), peak_rate_deg_s * between(0.9, 1.1), between(-100.0, 100.0)};
-    d.declared_threshold_deg_h = threshold_deg_h;
-    d.injected_rad = of.condition->injected_rad;
-    if (of.gyro) {
-        d.scale_factor_arcsec = of.gyro->scale_factor_arcsec;
-        d.dither_frequency_hz = of.gyro->dither_frequency_hz;
-    }
-    if (of.condition->other_gyro) draw_other(d, random);
-    d.duration_s = 0.5 * static_cast<double>(of.turns) / d.dither_frequency_hz;
-    if (of.condition->moving) {
-        d.rate_deg_h = 0.0;
-        double time_s = 0.0;
-        double rate = between(-300.0, 300.0);
-        while (time_s < d.duration_s) {
-            const double next = between(-300.0, 300.0);
-            const double hold_s = between(0.1, 0.3) * d.duration_s;
-            for (const double t : {time_s, time_s + hold_s}) {
-                d.profile_time_s.push_back(t);
-                d.profile_rate_deg_h.push_back(rate);
-            }
-            time_s += hold_s + 1.0;
-            rate = next;
-        }
-    }
-    return d;
-}
 
 record::Record by_map(const Case& of, const Device& device) {
     scenario::Scenario scenario = plain_gyro(static_cast<double>(of.turns), of.seed + (of.noise << 32));
@@ -244,12 +162,6 @@ bool is_within_bounds(const Added& added) {
         }
     }
     return true;
-}
-
-double deviation_of(const Estimate& estimate, double truth) {
-    double off = estimate.value - truth;
-    if (estimate.name == "phase_rad") off = std::remainder(off, units::two_pi);
-    return off / estimate.sd;
 }
 
 }  // namespace
@@ -450,154 +362,6 @@ std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
               {"period_s", k % 3 == 0 ? even(6.0, 18.0) : even(35.0, 130.0)}}});
     }
     return cases;
-}
-
-double gain_asked(const std::vector<std::string>& missing, double library) {
-    constexpr double none = std::numeric_limits<double>::quiet_NaN();
-    double least = std::numeric_limits<double>::infinity();
-    for (const std::string& effect : missing) {
-        const effects::Effect& of = *effects::find(effect);
-        if (ringlock::closure::told_by_other_columns(of)) return none;
-        const auto parameters = of.parameters();
-        const auto freedom = std::count_if(parameters.begin(), parameters.end(), [](const effects::Parameter& p) {
-            return p.role != effects::Role::time && p.role != effects::Role::frequency;
-        });
-        const boost::math::chi_squared chi2(static_cast<double>(freedom));
-        const double level = ringlock::closure::options.level_of_effects / library;
-        least = std::min(least, 0.5 * boost::math::quantile(boost::math::complement(chi2, level)));
-    }
-    return std::isfinite(least) ? least : none;
-}
-
-namespace {
-
-/// True effects that no step holds. One that names a true effect holds that or one that it is tied to; where it names
-/// another, all that is tied to that may stand in its place together.
-std::vector<std::string> not_held(const std::set<std::string>& true_effects,
-                                  const std::vector<ringlock::closure::Step>& steps) {
-    const std::vector<std::string> wanted(true_effects.begin(), true_effects.end());
-    std::vector<std::string> least = wanted;
-    std::vector<std::string> lacking;
-    std::vector<bool> taken(steps.size());
-    const auto hold = [&](const auto& self, std::size_t k) -> void {
-        if (k == wanted.size()) {
-            if (lacking.size() < least.size()) least = lacking;
-            return;
-        }
-        for (std::size_t s = 0; s < steps.size(); ++s) {
-            const auto& others = steps[s].confounded_with;
-            const bool among = std::any_of(others.begin(), others.end(),
-                                           [&](const auto* other) { return other->name() == wanted[k]; });
-            if (taken[s] || (steps[s].name() != wanted[k] && !among)) continue;
-            taken[s] = true_effects.contains(steps[s].name());
-            self(self, k + 1);
-            taken[s] = false;
-        }
-        lacking.push_back(wanted[k]);
-        self(self, k + 1);
-        lacking.pop_back();
-    };
-    hold(hold, 0);
-    return least;
-}
-
-}  // namespace
-
-void compare(const Closure& closure, std::optional<Where> where, const std::vector<Added>& truth, Outcome& outcome) {
-    outcome.verdict = std::string(name_of(closure.verdict));
-    outcome.before = closure.heldout_before;
-    outcome.after = closure.heldout_after;
-    outcome.floor = closure.noise_floor;
-    outcome.answer_gain = closure.log_likelihood_gain;
-    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
-    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
-    std::set<std::string> true_effects;
-    for (const Added& added : truth) true_effects.insert(added.effect);
-    bool ties = false;
-    for (const auto& step : closure.steps) {
-        outcome.named += (outcome.named.empty() ? "" : "+") + step.name();
-        for (const auto* other : step.confounded_with) outcome.named += "~" + std::string(other->name());
-        const bool named = true_effects.contains(step.name());
-        const bool tied_to_truth =
-            std::any_of(step.confounded_with.begin(), step.confounded_with.end(),
-                        [&](const auto* other) { return true_effects.contains(std::string(other->name())); });
-        ties = ties || (named ? !step.confounded_with.empty() : tied_to_truth);
-        if (!named && !tied_to_truth) outcome.false_name = true;
-    }
-    outcome.missing = not_held(true_effects, closure.steps);
-    const bool unexplained = closure.verdict == Verdict::unexplained;
-    const bool as_it_is = unexplained ? where && closure.unexplained->where == *where : !where;
-    if (outcome.false_name && !unexplained) {
-        outcome.judged = Judged::wrong;
-    } else if (unexplained && (!as_it_is || outcome.false_name)) {
-        outcome.judged = Judged::unexplained;
-    } else if (!as_it_is || !outcome.missing.empty()) {
-        outcome.judged = Judged::missed;
-    } else {
-        outcome.judged = ties ? Judged::tie : Judged::right;
-    }
-}
-
-std::string fault_of_closed(const record::Record& record, const Closure& closure) {
-    constexpr double longest_s = 12.0;
-    const auto closed = ringlock::closure::closed_scenario(record, closure);
-    for (const scenario::Complaint& complaint : scenario::check(closed.scenario)) return complaint.problem;
-    try {
-        const std::string text = to_toml(closed, "a record", closure.verdict);
-        if (!(scenario::parse_string(text, "closed.toml") == closed.scenario))
-            return "is read back as another scenario";
-        scenario::Scenario brief = closed.scenario;
-        brief.ensemble.duration_s = std::min(brief.ensemble.duration_s, longest_s);
-        if (scenario::check(brief).empty()) instrument::simulate_record(brief);
-    } catch (const std::exception& error) {
-        return error.what();
-    }
-    return "";
-}
-
-Outcome judge(const Case& of, const record::Record& record) {
-    Outcome outcome;
-    const auto start = std::chrono::steady_clock::now();
-    const Closure closure = ringlock::closure::close_turns(record);
-    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const bool foreign = !of.foreign.empty();
-    compare(closure, foreign ? std::optional(of.where) : std::nullopt, of.truth, outcome);
-    outcome.closed_fault = fault_of_closed(record, closure);
-    if (foreign) return outcome;
-
-    std::vector<ActiveEffect> known;
-    for (const Added& added : of.truth) {
-        known.push_back({effects::find(added.effect), {added.values.begin(), added.values.end()}});
-    }
-    const Closure oracle = fit_turns(record, known);
-    outcome.oracle = oracle.heldout_after;
-    outcome.truth_gain = oracle.log_likelihood_gain;
-    outcome.asked_gain = gain_asked(outcome.missing, static_cast<double>(effects::registry().size()));
-    if (outcome.judged != Judged::right) return outcome;
-    const Device device = device_of(of);
-    const std::map<std::string, double> base_truth = {
-        {"bias_deg_h", 0.0},
-        {"lockin_threshold_deg_h", device.threshold_deg_h},
-        {"injected_noise_rad", device.injected_rad},
-        {"readout_noise_rad", device.readout_noise},
-        {"dither_frequency_hz", device.dither_frequency_hz},
-    };
-    for (const Estimate& estimate : closure.base) {
-        const auto truth = base_truth.find(estimate.name);
-        if (truth == base_truth.end() || (truth->second == 0.0 && estimate.name != "bias_deg_h")) continue;
-        outcome.deviations.push_back(
-            {estimate.name, estimate.value, estimate.sd, deviation_of(estimate, truth->second)});
-    }
-    for (const auto& step : closure.steps) {
-        for (const Added& added : of.truth) {
-            if (added.effect != step.name()) continue;
-            for (const Estimate& estimate : step.parameters) {
-                outcome.deviations.push_back({step.name() + "." + estimate.name, estimate.value, estimate.sd,
-                                              deviation_of(estimate, added.values.at(estimate.name))});
-            }
-        }
-    }
-    return outcome;
 }
 
 }  // namespace ringlock::test::closure

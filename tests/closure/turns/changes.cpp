@@ -104,9 +104,9 @@ TEST(EffectRoles, AreThoseOfTheirSetups) {
               0.3);
     for (const auto* effect :
          {roles.asymmetry.effect, roles.harmonic.effect, roles.ellipse.effect, roles.missed_counts.effect}) {
-        EXPECT_TRUE(told_by_other_columns(*effect)) << effect->name();
+        EXPECT_TRUE(estimated_from_other_columns(*effect)) << effect->name();
     }
-    EXPECT_FALSE(told_by_other_columns(hop));
+    EXPECT_FALSE(estimated_from_other_columns(hop));
 }
 
 TEST(EffectRoles, APhaseOfItsOwnTurnsNoSize) {

@@ -5,9 +5,9 @@
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/instrument/simulate.hpp"
+#include "tests/closure/answers.hpp"
 #include "tests/closure/generator/generator.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"
-#include "tests/closure/told.hpp"
 
 namespace ringlock::test::closure {
 namespace turns_gyros_test {

@@ -15,10 +15,10 @@
 #include "engine/core/units.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
+#include "tests/closure/answers.hpp"
 #include "tests/closure/generator/generator.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"
 #include "tests/closure/heldout.hpp"
-#include "tests/closure/told.hpp"
 
 namespace ringlock::test::closure {
 namespace turns_loop_test {

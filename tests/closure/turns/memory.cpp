@@ -57,14 +57,14 @@ TEST(TurnFitMemory, WhatWasPutAwayComesAgainBitForBit) {
     const std::vector<double> phase_rad = of.fit.prediction().phase_rad;
     std::vector<double> ramp = of.series.time_s;
     const TurnFit::Score score = of.fit.score({ramp});
-    of.fit.put_away();
+    of.fit.release();
     EXPECT_EQ(of.fit.innovations(), innovations);
     EXPECT_EQ(of.fit.sd_rad(), sd_rad);
     EXPECT_EQ(of.fit.prediction().phase_rad, phase_rad);
     EXPECT_EQ(of.fit.score({ramp}).chi2, score.chi2);
     // The columns are in the standard errors: asked for with those at hand that the fit ended with, and with others.
     const auto again = of.fit.with_noise(of.fit.parameters());
-    again->put_away();
+    again->release();
     const ShortFit fresh;
     const auto& before = fresh.fit.estimates();
     const auto& after = again->estimates();

@@ -467,16 +467,16 @@ TEST(NoiseShape, IsWhatTheJacobianLeavesOfEvenNoise) {
     std::vector<double> innovations(20000);
     for (double& v : innovations) v = even(random);
     const std::vector<int> direction{1, -1, 1, -1};
-    const std::vector<double> foretold{0.3, -2.0, 7.0, 1.234};
+    const std::vector<double> predicted{0.3, -2.0, 7.0, 1.234};
     // Without lock-in in closed form, by the mean square bound^2 / 3.
-    const auto plain = NoiseShape::of(innovations, TurnKicks(), direction, foretold);
+    const auto plain = NoiseShape::of(innovations, TurnKicks(), direction, predicted);
     ASSERT_NE(plain, nullptr);
-    for (std::size_t i = 0; i < foretold.size(); ++i) {
+    for (std::size_t i = 0; i < predicted.size(); ++i) {
         for (int k = 1; k <= 4; ++k) {
             const double h = k * bound;
             const double with_noise = 3.0 * (std::sin(h) - h * std::cos(h)) / (h * h * bound);
             const std::complex<double> left =
-                std::complex<double>(0.0, with_noise - std::sin(h) / bound) * std::polar(1.0, k * foretold[i]);
+                std::complex<double>(0.0, with_noise - std::sin(h) / bound) * std::polar(1.0, k * predicted[i]);
             EXPECT_LT(std::abs(plain->at(i)[static_cast<std::size_t>(k - 1)] - left), 0.02) << k;
         }
     }
@@ -486,15 +486,15 @@ TEST(NoiseShape, IsWhatTheJacobianLeavesOfEvenNoise) {
     setup.dither_frequency_hz = 124.68;
     setup.dither_peak_rate_deg_s = 109.1;
     const TurnKicks kicks(setup);
-    const auto locked = NoiseShape::of(innovations, kicks, direction, foretold);
-    for (std::size_t i = 0; i < foretold.size(); ++i) {
+    const auto locked = NoiseShape::of(innovations, kicks, direction, predicted);
+    for (std::size_t i = 0; i < predicted.size(); ++i) {
         std::complex<double> left[2] = {};
         constexpr int draws = 200000;
         for (int draw = 0; draw < draws; ++draw) {
             const double v = even(random);
-            const double psi = kicks.phase_after(direction[i], foretold[i] + v);
+            const double psi = kicks.phase_after(direction[i], predicted[i] + v);
             const auto kick = kicks.at(direction[i], psi);
-            EXPECT_NEAR(psi, foretold[i] + v + kick.before_rad, 1e-12);
+            EXPECT_NEAR(psi, predicted[i] + v + kick.before_rad, 1e-12);
             for (int k = 1; k <= 2; ++k) {
                 left[k - 1] += std::polar(1.0, k * psi) *
                                std::complex<double>(3.0 * v / (bound * bound), -k / (1.0 - kick.before_slope)) /

@@ -126,7 +126,7 @@ TEST(LongClosureSuite, SizesFollowPhasesThatAreForetoldAlike) {
         of.noise = static_cast<std::uint64_t>(k);
         const auto closure = ringlock::closure::close_loop(make({&of, 1}).front());
         for (const auto& test : closure.tests) {
-            if (test.view != "size of the residual over the turn's phase") continue;
+            if (test.subject != "size of the residual over the turn's phase") continue;
             EXPECT_GT(test.p_value, 1e-3) << k;
             product *= test.p_value;
         }
@@ -518,10 +518,10 @@ TEST(TwoStates, AreSummedOverAllCourses) {
     const auto found = ringlock::closure::two_states(normal, right, shape);
     const auto gain = [&](const ringlock::closure::TwoStates& states) {
         double sum = 0.0;
-        for (unsigned course = 0; course < 1U << n; ++course) {
+        for (unsigned path = 0; path < 1U << n; ++path) {
             Eigen::VectorXd rate(n);
             double chance = 0.5;
-            const auto upper = [&](Eigen::Index k) { return (course >> k & 1U) != 0; };
+            const auto upper = [&](Eigen::Index k) { return (path >> k & 1U) != 0; };
             for (Eigen::Index k = 0; k < n; ++k) {
                 rate(k) = states.rate + (upper(k) ? states.step : 0.0);
                 if (k == 0) continue;
@@ -558,10 +558,10 @@ TEST(TwoStates, ManyJumpsCostLessThanTheirPlaces) {
         right(k) = state - 2.0 + normal(random);
     }
     const Eigen::MatrixXd each = Eigen::MatrixXd::Identity(n, n);
-    const auto course = ringlock::closure::two_levels(each, right);
-    ASSERT_GT(course.changes, 5);
-    const auto states = ringlock::closure::two_states(each, right, course.shape);
-    EXPECT_GT(states.gain, course.merit + 2.0 * course.changes);
+    const auto path = ringlock::closure::two_levels(each, right);
+    ASSERT_GT(path.changes, 5);
+    const auto states = ringlock::closure::two_states(each, right, path.shape);
+    EXPECT_GT(states.gain, path.evidence + 2.0 * path.changes);
     EXPECT_NEAR(states.step, 4.0, 0.6);
     EXPECT_NEAR(states.up, 0.2, 0.12);
 }

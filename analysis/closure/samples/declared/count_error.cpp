@@ -90,7 +90,7 @@ std::shared_ptr<SampleFit> with_interpolated_errors(const SampleFit& fit, const 
     const double rate_hz = fit.series().rate_hz;
     // The declared frequency, and the one near it that the squares show, since a dither drifts.
     std::vector<double> all_hz{alias(dither_hz, rate_hz).hz};
-    const FoundCycle cycle = find_cycle(fit.innovations(), fit.telling(), rate_hz);
+    const FoundCycle cycle = find_cycle(fit.innovations(), fit.informative(), rate_hz);
     const double resolution_hz = rate_hz / static_cast<double>(fit.series().size());
     const double tolerance_hz = options.samples.declared_dither_error * dither_hz + resolution_hz;
     if (cycle.p_value < options.samples.turns.seen_p && std::abs(cycle.frequency_hz - all_hz.front()) < tolerance_hz) {

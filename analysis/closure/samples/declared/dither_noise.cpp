@@ -100,7 +100,7 @@ class Search {
         std::vector<double> values(all.size());
         oneapi::tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t k) {
             const std::vector<double> each = SampleFilter::minus_log_likelihoods(
-                sizes_with(all[k]), base_.series().interval_s, base_.rest(), base_.telling());
+                sizes_with(all[k]), base_.series().interval_s, base_.rest(), base_.informative());
             values[k] = *std::min_element(each.begin(), each.end());
         });
         const auto best = std::min_element(values.begin(), values.end()) - values.begin();
@@ -113,7 +113,7 @@ class Search {
         SampleModel model = base_.model();
         const auto sizes = sizes_with(noise);
         const std::vector<double> each =
-            SampleFilter::minus_log_likelihoods(sizes, base_.series().interval_s, base_.rest(), base_.telling());
+            SampleFilter::minus_log_likelihoods(sizes, base_.series().interval_s, base_.rest(), base_.informative());
         model.noise = sizes[static_cast<std::size_t>(std::min_element(each.begin(), each.end()) - each.begin())];
         SampleFit fit(base_.series(), std::move(model), base_.rows(), SampleFit::Noise::free);
         whites_ = {fit.model().noise.angle_arcsec, fit.model().noise.rate_arcsec_rt_s};
@@ -164,7 +164,7 @@ bool has_dither_line(const SampleFit& fit, double dither_hz) {
     const double rate_hz = fit.series().rate_hz;
     const auto& columns = fit.model().columns;
     return std::any_of(columns.begin(), columns.end(), [&](const SampleColumn& column) {
-        const double apart_hz = alias(column.course.hz, rate_hz).hz - alias(dither_hz, rate_hz).hz;
+        const double apart_hz = alias(column.track.hz, rate_hz).hz - alias(dither_hz, rate_hz).hz;
         return column.name == "cosine" && std::abs(apart_hz) < options.samples.declared_dither_error * dither_hz;
     });
 }

@@ -107,7 +107,7 @@ Folded fold(const SampleFit& fit, double turns_a_row) {
     Folded folded;
     const auto& e = fit.innovations();
     for (std::size_t i = 0; i < e.size(); ++i) {
-        if (!fit.telling()[i]) continue;
+        if (!fit.informative()[i]) continue;
         const double turns = turns_a_row * static_cast<double>(i + 1);
         const auto bin = static_cast<std::size_t>((turns - std::floor(turns)) * cycle_bins) % cycle_bins;
         folded.squares[bin] += e[i] * e[i];
@@ -165,7 +165,7 @@ std::optional<SeenTurns> turns_in_squares(const SampleFit& base, const record::D
     double mean = 0.0;
     double count = 0.0;
     for (std::size_t i = 0; i < e.size(); ++i) {
-        if (!base.telling()[i]) continue;
+        if (!base.informative()[i]) continue;
         mean += e[i] * e[i];
         count += 1.0;
     }
@@ -173,7 +173,7 @@ std::optional<SeenTurns> turns_in_squares(const SampleFit& base, const record::D
     std::vector<double> squares(e.size(), 0.0);
     double power = 0.0;
     for (std::size_t i = 0; i < e.size(); ++i) {
-        if (!base.telling()[i]) continue;
+        if (!base.informative()[i]) continue;
         squares[i] = e[i] * e[i] - mean;
         power += squares[i] * squares[i];
     }
@@ -184,17 +184,17 @@ std::optional<SeenTurns> turns_in_squares(const SampleFit& base, const record::D
     const double tolerance_hz = std::max(options.samples.declared_dither_error * declared_hz, 8.0 * bin_hz);
     double seen_hz = declared_hz;
     double seen_power = 0.0;
-    double searched = 0.0;
+    double look_elsewhere = 0.0;
     for (double hz = declared_hz - tolerance_hz; hz <= declared_hz + tolerance_hz; hz += bin_hz) {
         const double alias_hz = std::abs(std::remainder(hz, series.rate_hz));
         const auto at = static_cast<std::size_t>(std::llround(alias_hz / bin_hz));
-        searched += 1.0;
+        look_elsewhere += 1.0;
         // A slow change of the noise is no pattern of turns.
         if (at < by.fewest_cycles || at >= spectrum.size() || spectrum[at] <= seen_power) continue;
         seen_power = spectrum[at];
         seen_hz = hz;
     }
-    if (!(power > 0.0) || of_several(std::exp(-seen_power / power), searched) > by.seen_p) return std::nullopt;
+    if (!(power > 0.0) || of_several(std::exp(-seen_power / power), look_elsewhere) > by.seen_p) return std::nullopt;
     return SeenTurns{seen_hz, bin_hz};
 }
 
@@ -321,7 +321,7 @@ double excess_of_kicks(const SampleFit& fit, std::size_t length) {
     double sum = 0.0;
     double count = 0.0;
     for (std::size_t i = 1; i < fit.innovations().size(); ++i) {
-        if (!fit.telling()[i]) continue;
+        if (!fit.informative()[i]) continue;
         const double kicks = noise.kicks->variance[i] + noise.kicks->carried[i - 1];
         const double share = noise.kick_variance() / (fit.sd(i) * fit.sd(i));
         sum += noise.kick_excess * kicks * share * share;

@@ -99,11 +99,11 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const auto& columns = fit.model().columns;
     const SampleColumn& column = columns[cosine];
     const effects::Effect& effect = *column.effect;
-    const auto courses = parameters_of(effect, Role::frequency);
-    const LineCourse& course = column.course;
+    const auto frequencies = parameters_of(effect, Role::frequency);
+    const FrequencyTrack& track = column.track;
     const double a = column.value;
     const double b = columns[cosine + 1].value;
-    const auto slopes = line_slopes(fit, course, a, b);
+    const auto slopes = line_slopes(fit, track, a, b);
     const Eigen::MatrixXd joint = fit.joint_covariance(slopes);
     const auto of_a = static_cast<Eigen::Index>(cosine);
     const auto of_hz = static_cast<Eigen::Index>(columns.size());
@@ -111,43 +111,43 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     // Derivatives of the amplitude by a and b
     const Eigen::Vector2d along(a / amplitude, b / amplitude);
     const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
-    const Unaliased real = unaliased(course.hz, fit, declared);
+    const Unaliased real = unaliased(track.hz, fit, declared);
     const double hz_sd = std::sqrt(std::max(0.0, joint(of_hz, of_hz)));
     if (on_samples(effect) == OnSamples::angle_line) {
         all.push_back(
-            estimate_of(effect, courses[0]->name, real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)));
-        if (course.free == 1 && courses.size() > 1) {
+            estimate_of(effect, frequencies[0]->name, real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)));
+        if (track.free == 1 && frequencies.size() > 1) {
             // The drift is held at zero; the error is that of a drift that was fitted.
-            LineCourse drifting = course;
+            FrequencyTrack drifting = track;
             drifting.free = 2;
             const auto more = fit.joint_covariance(line_slopes(fit, drifting, a, b));
             const double sd = std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)));
-            all.push_back(estimate_of(effect, courses[1]->name, 0.0, sd));
+            all.push_back(estimate_of(effect, frequencies[1]->name, 0.0, sd));
         }
-        for (std::size_t k = 1; k < std::min(course.free, courses.size()); ++k) {
+        for (std::size_t k = 1; k < std::min(track.free, frequencies.size()); ++k) {
             const auto at = of_hz + static_cast<Eigen::Index>(k);
-            all.push_back(estimate_of(effect, courses[k]->name, real.drift_sign * course.coefficient(k),
+            all.push_back(estimate_of(effect, frequencies[k]->name, real.drift_sign * track.coefficient(k),
                                       std::sqrt(std::max(0.0, joint(at, at)))));
         }
-        const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * course.hz * series.interval_s)));
+        const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * track.hz * series.interval_s)));
         all.push_back(
             estimate_of(effect, parameter_of(effect, Role::sampled).name, amplitude / gain, amplitude_sd / gain));
         notes.push_back(note_on_aliases(real, fit, declared, effect,
                                         [&](double) { return fmt::format("{:.3g} arcsec", amplitude / gain); }));
         return;
     }
-    all.push_back(estimate_of(effect, courses[0]->name, course.hz, hz_sd));
+    all.push_back(estimate_of(effect, frequencies[0]->name, track.hz, hz_sd));
     // Increments are integrals of a rate over each interval.
-    const double gain = std::sin(units::pi * course.hz * series.interval_s) / (units::pi * course.hz);
+    const double gain = std::sin(units::pi * track.hz * series.interval_s) / (units::pi * track.hz);
     all.push_back(estimate_of(effect, parameter_of(effect, Role::size).name, amplitude / std::abs(gain),
                               amplitude_sd / std::abs(gain)));
-    notes.push_back(note_on_aliases({course.hz}, fit, declared, effect, [&](double hz) {
+    notes.push_back(note_on_aliases({track.hz}, fit, declared, effect, [&](double hz) {
         const double integrated = std::sin(units::pi * hz * series.interval_s) / (units::pi * hz);
         return fmt::format("{:.3g} deg/h", amplitude / std::max(std::abs(integrated), 1e-12));
     }));
     // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
     const double middle_s = middle_of(series);
-    const double turns = course.hz * middle_s;
+    const double turns = track.hz * middle_s;
     const double sign = std::copysign(1.0, gain);
     const double phase = std::atan2(sign * a, sign * b) - units::two_pi * (turns - std::floor(turns));
     Eigen::VectorXd by = Eigen::VectorXd::Zero(joint.rows());
@@ -218,33 +218,33 @@ double power_between(const SampleNoise::Resonance& resonance, double from_hz, do
 }
 
 /// Part of a motion that a witness does not predict, with the relative errors of the amplitudes.
-struct Untold {
+struct Incoherent {
     std::vector<SampleNoise::Resonance> resonances;
     std::vector<double> relative;
 };
 
-Untold untold_in(const SampleFit& fit, int step) {
+Incoherent incoherent_in(const SampleFit& fit, int step) {
     const SampleModel errors = fit.noise_errors();
-    Untold untold;
+    Incoherent incoherent;
     for (std::size_t k = 0; k < fit.model().resonances.size(); ++k) {
         if (fit.model().resonances[k].step != step) continue;
         const SampleNoise::Resonance& resonance = fit.model().noise.resonances[k];
-        untold.resonances.push_back(resonance);
-        untold.relative.push_back(errors.noise.resonances[k].arcsec / std::max(resonance.arcsec, 1e-12));
+        incoherent.resonances.push_back(resonance);
+        incoherent.relative.push_back(errors.noise.resonances[k].arcsec / std::max(resonance.arcsec, 1e-12));
     }
-    return untold;
+    return incoherent;
 }
 
 /// A weak motion is predicted by two numbers only, since a response of many lags would be mostly noise: the unpredicted
 /// part is the motion's resonance, fitted next to these.
-Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
-    SampleModel beside = whole.model();
-    beside.motion.assign(fit.series().size(), 0.0);
+Incoherent incoherent_with_motion_held(const SampleFit& fit, const SampleFit& whole) {
+    SampleModel held = whole.model();
+    held.motion.assign(fit.series().size(), 0.0);
     for (const SampleColumn& column : fit.model().columns) {
         if (!is_motion(column.effect)) continue;
-        for (std::size_t i = 0; i < beside.motion.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
+        for (std::size_t i = 0; i < held.motion.size(); ++i) held.motion[i] += column.value * (*column.series)[i];
     }
-    const SampleFit left(fit.series(), std::move(beside), fit.rows(), SampleFit::Noise::near);
+    const SampleFit left(fit.series(), std::move(held), fit.rows(), SampleFit::Noise::near);
     const SampleNoise::Resonance& resonance = left.model().noise.resonances.front();
     const double sd = left.noise_errors().noise.resonances.front().arcsec;
     return {{resonance}, {sd / std::max(resonance.arcsec, 1e-12)}};
@@ -253,9 +253,9 @@ Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
 /// The motion's angle as a resonance of its own, without any prediction from the witness. In the model without the
 /// motion, other noises may have absorbed it; the noises that were fitted with it are therefore tried as a start as
 /// well.
-SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& told,
+SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& fitted,
                               const ResonanceOwner& owner) {
-    const double centre_hz = std::max(told.centre_hz, 0.01);
+    const double centre_hz = std::max(fitted.centre_hz, 0.01);
     std::optional<SampleFit> best;
     for (const SampleModel& from : {bare.model(), without_motion(fit.model())}) {
         SampleModel with = bare.model();
@@ -264,7 +264,7 @@ SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const
         with.motion_from_hz = options.samples.fit.slowest_of_motion * centre_hz;
         with.resonances.insert(with.resonances.begin(), owner);
         with.noise.resonances.insert(with.noise.resonances.begin(),
-                                     {std::max(told.rms_arcsec, 1e-6), centre_hz, 0.5 * centre_hz});
+                                     {std::max(fitted.rms_arcsec, 1e-6), centre_hz, 0.5 * centre_hz});
         SampleFit whole(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::free);
         if (!best || whole.log_likelihood() > best->log_likelihood()) best.emplace(std::move(whole));
     }
@@ -288,9 +288,9 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
     };
     take("witness", static_cast<double>(name.back() - 'x'), 0.0).text = name;
     const SampleFit bare(series, without_motion(fit.model()), fit.rows(), SampleFit::Noise::near);
-    const WitnessMotion told = fit_witness(bare, witness);
-    const double centre = std::max(told.centre_hz, 0.01);
-    const SampleFit whole = motion_as_resonance(fit, bare, told, {&added.effect(), added.id});
+    const WitnessMotion fitted = fit_witness(bare, witness);
+    const double centre = std::max(fitted.centre_hz, 0.01);
+    const SampleFit whole = motion_as_resonance(fit, bare, fitted, {&added.effect(), added.id});
     const auto& motion = whole.model().noise.resonances.front();
     const SampleNoise errors = whole.noise_errors().noise;
     const SampleNoise::Resonance& error = errors.resonances.front();
@@ -305,16 +305,17 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
     if (seen) {
         // Power that is still needed in addition to the prediction, in the band of the motion: elsewhere it is power
         // that the witness cannot predict.
-        const Untold untold = added.strong ? untold_in(fit, added.id) : untold_beside(fit, whole);
+        const Incoherent incoherent =
+            added.strong ? incoherent_in(fit, added.id) : incoherent_with_motion_held(fit, whole);
         const auto power = [&](const SampleNoise::Resonance& of) {
             return power_between(of, motion.hz - motion.width_hz, motion.hz + motion.width_hz, of_readings_hz(fit));
         };
         double squares = 0.0;
         double squares_sd = 0.0;
-        for (std::size_t k = 0; k < untold.resonances.size(); ++k) {
-            const double part = power(untold.resonances[k]);
+        for (std::size_t k = 0; k < incoherent.resonances.size(); ++k) {
+            const double part = power(incoherent.resonances[k]);
             squares += part;
-            if (untold.relative[k] > 0.0) squares_sd += std::pow(2.0 * part * untold.relative[k], 2);
+            if (incoherent.relative[k] > 0.0) squares_sd += std::pow(2.0 * part * incoherent.relative[k], 2);
         }
         squares_sd = std::sqrt(squares_sd);
         const double all_of_it = power(motion);
@@ -330,8 +331,8 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
             "the motion is known only from its witness: its own spectrum does not exceed the noise, "
             "so that coherence, rms, centre and width have no standard error");
     }
-    take("coherence", seen ? coherence : told.coherence, coherence_sd);
-    take("rms_arcsec", seen ? motion.arcsec : told.rms_arcsec, seen ? error.arcsec : unknown);
+    take("coherence", seen ? coherence : fitted.coherence, coherence_sd);
+    take("rms_arcsec", seen ? motion.arcsec : fitted.rms_arcsec, seen ? error.arcsec : unknown);
     take("centre_hz", seen ? motion.hz : centre, seen ? error.hz : unknown);
     take("width_hz", seen ? motion.width_hz : 0.5 * centre, seen ? error.width_hz : unknown);
 }

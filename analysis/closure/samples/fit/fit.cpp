@@ -42,14 +42,14 @@ std::vector<double> SampleFit::as_taken(const std::vector<double>& increments) c
     return closure::as_taken(source_of(model_.noise), increments, series_->interval_s);
 }
 
-std::vector<std::vector<double>> SampleFit::line(const LineCourse& course) const {
-    return line_as_taken(source_of(model_.noise), series_->size(), series_->rate_hz, course);
+std::vector<std::vector<double>> SampleFit::line(const FrequencyTrack& track) const {
+    return line_as_taken(source_of(model_.noise), series_->size(), series_->rate_hz, track);
 }
 
 std::vector<double> SampleFit::taken(const SampleColumn& column) const {
     if (column.as_recorded || !(model_.noise.from_hz > 0.0)) return *column.series;
-    if (column.course.hz == 0.0) return as_taken(*column.series);
-    return line(column.course)[column.name == "cosine" ? 0 : 1];
+    if (column.track.hz == 0.0) return as_taken(*column.series);
+    return line(column.track)[column.name == "cosine" ? 0 : 1];
 }
 
 std::vector<SampleFit::Shared> SampleFit::taken_by(const SampleModel& model) const {
@@ -62,11 +62,11 @@ std::vector<SampleFit::Shared> SampleFit::taken_by(const SampleModel& model) con
         const SampleColumn& column = model.columns[all.size()];
         if (column.as_recorded || !(source.from_hz > 0.0)) {
             all.push_back(column.series);
-        } else if (column.course.hz == 0.0) {
+        } else if (column.track.hz == 0.0) {
             all.push_back(share(closure::as_taken(source, *column.series, series_->interval_s)));
         } else {
             // A cosine, and the sine that follows it.
-            for (auto& taken : line_as_taken(source, series_->size(), series_->rate_hz, column.course)) {
+            for (auto& taken : line_as_taken(source, series_->size(), series_->rate_hz, column.track)) {
                 all.push_back(share(std::move(taken)));
             }
         }
@@ -104,41 +104,41 @@ std::vector<double> SampleFit::rest_of(const SampleModel& model) const {
 
 void SampleFit::filter_by(const SampleNoise& noise) {
     filter_ = std::make_shared<SampleFilter>(noise, series_->size(), series_->interval_s);
-    find_settled(noise);
+    find_deterministic(noise);
 }
 
 /// The values of the digits are unknown: a row is informative if its prediction would be as uncertain with other
 /// digits.
-void SampleFit::find_settled(SampleNoise noise) {
+void SampleFit::find_deterministic(SampleNoise noise) {
     const SampleFitOptions& by = options.samples.fit;
     const std::size_t n = series_->size();
-    settled_.assign(n, 0);
-    telling_ = *rows_;
+    deterministic_.assign(n, 0);
+    informative_ = *rows_;
     if (!(noise.from_hz > 0.0)) return;
     SampleNoise blurred = noise;
     noise.digits_arcsec *= by.coarser_digits;
     blurred.blur_arcsec *= by.coarser_digits;
-    const SampleFilter beside(noise, n, series_->interval_s);
+    const SampleFilter with_coarser_digits(noise, n, series_->interval_s);
     const SampleFilter with_blur(blurred, n, series_->interval_s);
     double largest = 0.0;
     for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, sd(i));
     std::vector<std::size_t> mostly_blur;
     std::size_t others = 0;
     for (std::size_t i = 0; i < n; ++i) {
-        if (sd(i) > by.settled_sd * largest && beside.sd(i) < by.settled_growth * sd(i)) {
+        if (sd(i) > by.deterministic_sd * largest && with_coarser_digits.sd(i) < by.deterministic_growth * sd(i)) {
             const bool blur = with_blur.sd(i) > by.blurred_growth * sd(i);
             if (blur) mostly_blur.push_back(i);
             others += blur ? 0 : 1;
             continue;
         }
-        settled_[i] = 1;
-        telling_[i] = 0;
+        deterministic_[i] = 1;
+        informative_[i] = 0;
     }
     // A few rows mostly determine the blur and are excluded; where most rows do, the blur is the noise of the record.
     if (mostly_blur.size() > others) return;
     for (const std::size_t i : mostly_blur) {
-        settled_[i] = 1;
-        telling_[i] = 0;
+        deterministic_[i] = 1;
+        informative_[i] = 0;
     }
 }
 
@@ -148,7 +148,7 @@ void SampleFit::fit_columns(bool held) {
     take_off();
     whitened_.clear();
     for (const Shared& taken : taken_by(model_)) whitened_.push_back(filter_->apply(*taken));
-    const ColumnRegression regression(whitened_, telling_);
+    const ColumnRegression regression(whitened_, informative_);
     const Eigen::VectorXd correction = regression.of(filter_->apply(rest_));
     covariance_ = regression.covariance();
     for (std::size_t k = 0; k < model_.columns.size(); ++k) {
@@ -179,7 +179,7 @@ double SampleFit::gain_over(const SampleFit& other) const {
     }
     double gain = 0.0;
     for (std::size_t i = 0; i < innovations_.size(); ++i) {
-        if (!telling_[i] || !other.telling_[i]) continue;
+        if (!informative_[i] || !other.informative_[i]) continue;
         const double e = innovations_[i];
         const double f = other.innovations_[i];
         gain += 0.5 * (f * f - e * e) + std::log(other.sd(i) / sd(i));
@@ -193,14 +193,14 @@ Eigen::MatrixXd SampleFit::normal_with(const std::vector<std::vector<double>>& s
     std::vector<const std::vector<double>*> all;
     for (const auto& w : whitened_) all.push_back(&w);
     for (const auto& w : more) all.push_back(&w);
-    right = products(all, innovations_, telling_);
-    return products(all, telling_);
+    right = products(all, innovations_, informative_);
+    return products(all, informative_);
 }
 
 Eigen::MatrixXd SampleFit::joint_covariance(const std::vector<std::vector<double>>& series) const {
     std::vector<std::vector<double>> all = whitened_;
     for (const auto& s : series) all.push_back(filter_->apply(s));
-    return ColumnRegression(all, telling_).covariance();
+    return ColumnRegression(all, informative_).covariance();
 }
 
 SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series) const {
@@ -218,12 +218,13 @@ SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series
     const Eigen::VectorXd target = right.tail(m - k) - cross * solver.solve(Eigen::VectorXd(right.head(k)));
     const Eigen::VectorXd s = scale.tail(m - k);
     freed = s.cwiseInverse().asDiagonal() * freed * s.cwiseInverse().asDiagonal();
-    const dense::MinimumNorm rest(freed, options.samples.fit.told_apart);
+    const dense::MinimumNorm rest(freed, options.samples.fit.least_independent_share);
     const Eigen::VectorXd scaled = s.cwiseInverse().asDiagonal() * target;
     const Eigen::VectorXd solution = rest.solve(scaled);
     Score score;
     score.chi2 = std::max(0.0, scaled.dot(solution));
-    score.rank = freed.diagonal().maxCoeff() > options.samples.fit.told_apart ? static_cast<int>(rest.rank()) : 0;
+    score.rank =
+        freed.diagonal().maxCoeff() > options.samples.fit.least_independent_share ? static_cast<int>(rest.rank()) : 0;
     for (Eigen::Index i = 0; i < m - k; ++i) score.value.push_back(solution(i) / s(i));
     score.covariance = s.cwiseInverse().asDiagonal() * rest.pseudo_inverse() * s.cwiseInverse().asDiagonal();
     return score;

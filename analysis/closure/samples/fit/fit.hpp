@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/closure/samples/model/filter.hpp"
-#include "analysis/closure/samples/model/line_course.hpp"
+#include "analysis/closure/samples/model/frequency_track.hpp"
 #include "analysis/closure/samples/model/series.hpp"
 #include "analysis/closure/samples/model/source.hpp"
 #include "analysis/closure/types.hpp"
@@ -26,7 +26,7 @@ struct SampleColumn {
     bool as_recorded = false;
     /// Frequency track of a line, in the column of its cosine and in that of its sine, which follows; 0 Hz: no line.
     /// The frequency may be any up to half of the rate at which the readings were taken.
-    LineCourse course = {};
+    FrequencyTrack track = {};
 };
 
 /// Effect, and step of the loop that added it, to which a resonance of the noise belongs.
@@ -71,9 +71,9 @@ class SampleFit {
     /// Whether a row is deterministic: it follows from the rows before it except for its digits, where a record has
     /// more samples than its source has readings. Where the error of a prediction grows from one interval to the next,
     /// the effect of the digits grows with it; such rows count as deterministic too.
-    bool settled(std::size_t row) const { return settled_[row] != 0; }
+    bool deterministic(std::size_t row) const { return deterministic_[row] != 0; }
     /// Rows that count and are not deterministic.
-    const Rows& telling() const { return telling_; }
+    const Rows& informative() const { return informative_; }
     /// Columns after the filter.
     const std::vector<std::vector<double>>& whitened() const { return whitened_; }
     /// Divided by their standard deviations; all rows.
@@ -90,7 +90,7 @@ class SampleFit {
     /// of the source where the record is resampled, else unchanged.
     std::vector<double> as_taken(const std::vector<double>& increments) const;
     /// Columns of cosine and sine of a line, as the record contains them.
-    std::vector<std::vector<double>> line(const LineCourse& course) const;
+    std::vector<std::vector<double>> line(const FrequencyTrack& track) const;
     /// Column as the record contains it.
     std::vector<double> taken(const SampleColumn& column) const;
     /// Increments of all deterministic parts of the model.
@@ -134,20 +134,20 @@ class SampleFit {
     std::vector<double> rest_of(const SampleModel& model) const;
     void take_off() { rest_ = rest_of(model_); }
     void take_whites(SampleNoise& noise) const;
-    ByClock by_clock(const std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
-    double value_at(const std::vector<double>& knobs, const Rows& rows) const;
-    std::vector<bool> places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const;
+    ByClock by_clock(const std::vector<double>& free_parameters, const Rows& rows, const std::vector<bool>& held) const;
+    double value_at(const std::vector<double>& free_parameters, const Rows& rows) const;
+    std::vector<bool> which_are_lost(const std::vector<double>& before, const std::vector<double>& after) const;
     void share_whites(SampleNoise& noise, double share) const;
     bool gone(const SampleNoise& noise) const;
     void raise_whites(SampleNoise& noise) const;
     /// Minus the log-likelihood under each model.
     std::vector<double> evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,
                                  const Rows& rows) const;
-    SampleModel at(const std::vector<double>& knobs) const;
+    SampleModel at(const std::vector<double>& free_parameters) const;
     void filter_by(const SampleNoise& noise);
-    void find_settled(SampleNoise noise);
-    Slope slope(const std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
-    void score_noise(std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
+    void find_deterministic(SampleNoise noise);
+    Slope slope(const std::vector<double>& free_parameters, const Rows& rows, const std::vector<bool>& held) const;
+    void score_noise(std::vector<double>& free_parameters, const Rows& rows, const std::vector<bool>& held) const;
     void fit_noise();
     void fit_columns(bool held = false);
     void finish();
@@ -163,8 +163,8 @@ class SampleFit {
     double log_likelihood_ = 0.0;
     double typical_sd_ = 0.0;
     Eigen::MatrixXd covariance_;
-    Rows settled_;
-    Rows telling_;
+    Rows deterministic_;
+    Rows informative_;
 };
 
 /// Gauss-Markov rates that add up to flicker of that bias instability between `shortest_s` and `longest_s`: two a

@@ -32,7 +32,7 @@ struct Free {
 constexpr std::size_t whites = 2;    // they are the first of the free parameters
 constexpr double negligible = 1e-4;  // ratio to the other white noise below which one has no effect on the fit
 
-std::vector<Free> knobs(SampleModel& model) {
+std::vector<Free> free_parameters(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
     if (model.walk) all.push_back({&model.noise.walk_arcsec2_s3, true});
     if (model.flicker) all.push_back({&model.flicker_deg_h, true});
@@ -64,11 +64,12 @@ std::vector<Free> knobs(SampleModel& model) {
     return all;
 }
 
-std::vector<double> places_of(SampleModel model) {
-    std::vector<double> places;
-    for (const Free& knob : knobs(model))
-        places.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
-    return places;
+std::vector<double> coordinates_of(SampleModel model) {
+    std::vector<double> coordinates;
+    for (const Free& parameter : free_parameters(model))
+        coordinates.push_back(parameter.logarithmic ? std::log(std::max(*parameter.value, 1e-300)) / parameter.scale
+                                                    : *parameter.value);
+    return coordinates;
 }
 
 /// Parameters without any information must not spoil the errors of the others.
@@ -142,7 +143,7 @@ std::vector<double> SampleFit::evaluate(const std::vector<SampleModel>& models, 
 SampleModel SampleFit::at(const std::vector<double>& x) const {
     const double duration_s = series_->interval_s * static_cast<double>(series_->size());
     SampleModel model = model_;
-    auto free = knobs(model);
+    auto free = free_parameters(model);
     for (std::size_t i = 0; i < free.size(); ++i)
         *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
@@ -170,7 +171,7 @@ SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows&
     ByClock by;
     by.moved.resize(x.size());
     SampleModel own = model_;
-    const auto all = knobs(own);
+    const auto all = free_parameters(own);
     std::vector<std::size_t> free;
     for (std::size_t j = 0; j < all.size(); ++j) {
         if (all[j].of_clock && (held.empty() || !held[j])) free.push_back(j);
@@ -193,9 +194,9 @@ SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows&
         for (std::size_t i = 0; i < by.rest.size(); ++i) by.rest[i] -= more * (*taken[k])[i];
     }
     for (const std::size_t j : free) {
-        auto beside = x;
-        beside[j] += step;
-        const SampleNoise there = at(beside).noise;
+        auto shifted = x;
+        shifted[j] += step;
+        const SampleNoise there = at(shifted).noise;
         SampleModel moved = model;
         moved.noise.from_hz = there.from_hz;
         moved.noise.from_phase = there.from_phase;
@@ -227,9 +228,9 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
     std::vector<SampleStates> moved_there;
     for (std::size_t j = 0; j < x.size(); ++j) {
         if (!held.empty() && held[j]) continue;
-        auto beside = x;
-        beside[j] += step;
-        SampleStates there(at(beside).noise, series_->interval_s);
+        auto shifted = x;
+        shifted[j] += step;
+        SampleStates there(at(shifted).noise, series_->interval_s);
         if (!there.is_like(here)) continue;  // beyond the end of its range
         moves.push_back(j);
         moved_there.push_back(there);
@@ -351,9 +352,9 @@ void SampleFit::raise_whites(SampleNoise& noise) const {
 }
 
 /// Free parameters for frequency and width of the resonances that one point has and the other has not.
-std::vector<bool> SampleFit::places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const {
+std::vector<bool> SampleFit::which_are_lost(const std::vector<double>& before, const std::vector<double>& after) const {
     SampleModel own = model_;
-    const auto all = knobs(own);
+    const auto all = free_parameters(own);
     const SampleModel had = at(before);
     const SampleModel has = at(after);
     std::vector<bool> lost(all.size(), false);
@@ -381,7 +382,7 @@ void SampleFit::fit_noise() {
             resonances[k].width_hz *= 3.0;
         }
     }
-    std::vector<double> start = places_of(model_);
+    std::vector<double> start = coordinates_of(model_);
     const std::size_t n = rest_.size();
     const bool resampled = model_.noise.from_hz > 0.0;
     const bool narrow = !model_.resonances.empty();
@@ -391,7 +392,7 @@ void SampleFit::fit_noise() {
         take_whites(anew.noise);
         double least = evaluate({at(start)}, rest_, *rows_).front();
         const auto try_from = [&](const SampleModel& model) {
-            auto other = places_of(model);
+            auto other = coordinates_of(model);
             const double value = evaluate({at(other)}, rest_, *rows_).front();
             if (!(value < least)) return;
             least = value;
@@ -413,7 +414,7 @@ void SampleFit::fit_noise() {
         // and the white noises are searched; the other parameters keep their values.
         const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
         std::vector<std::size_t> turned;
-        const std::vector<Free> own = knobs(model_);
+        const std::vector<Free> own = free_parameters(model_);
         for (std::size_t i = 0; i < own.size(); ++i) {
             if (!resampled || own[i].of_source || i < whites) turned.push_back(i);
         }
@@ -444,13 +445,13 @@ void SampleFit::fit_noise() {
         // Where one of the white noises goes to zero, there may be another maximum with both.
         SampleModel both = at(start);
         share_whites(both.noise, 0.5);
-        auto other = places_of(both);
+        auto other = coordinates_of(both);
         score_noise(other, *rows_, {});
         const auto values = evaluate({at(start), at(other)}, rest_, *rows_);
         if (values[1] < values[0]) start = std::move(other);
     }
     // A resonance that leaves its range does not return.
-    const std::vector<bool> lost = places_of_lost(as_it_was, start);
+    const std::vector<bool> lost = which_are_lost(as_it_was, start);
     if (std::find(lost.begin(), lost.end(), true) != lost.end()) {
         score_noise(as_it_was, *rows_, lost);
         if (value_at(as_it_was, *rows_) < value_at(start, *rows_)) start = std::move(as_it_was);
@@ -461,13 +462,13 @@ void SampleFit::fit_noise() {
         model_ = at(start);
         filter_by(model_.noise);
         fit_columns();
-        start = places_of(model_);
+        start = coordinates_of(model_);
         std::vector<bool> held;
-        for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
-        auto told = start;
-        score_noise(told, telling_, held);
-        const auto values = evaluate({at(told), at(start)}, rest_, *rows_);
-        if (values[0] < values[1]) start = std::move(told);
+        for (const Free& parameter : free_parameters(model_)) held.push_back(parameter.of_source);
+        auto scored = start;
+        score_noise(scored, informative_, held);
+        const auto values = evaluate({at(scored), at(start)}, rest_, *rows_);
+        if (values[0] < values[1]) start = std::move(scored);
     }
     model_ = at(start);
     filter_by(model_.noise);
@@ -477,9 +478,9 @@ SampleModel SampleFit::noise_errors() const {
     SampleModel errors = model_;
     SampleModel values = model_;
     raise_whites(values.noise);
-    const std::vector<double> x = places_of(values);
-    const auto own = knobs(values);
-    Eigen::MatrixXd information = slope(x, telling_, {}).information;
+    const std::vector<double> x = coordinates_of(values);
+    const auto own = free_parameters(values);
+    Eigen::MatrixXd information = slope(x, informative_, {}).information;
     if (model_.noise.from_hz > 0.0) {
         // The source's times and the deviation of its readings from straight lines are determined by the deterministic
         // rows as well. That deviation is correlated with the white angle.
@@ -505,7 +506,7 @@ SampleModel SampleFit::noise_errors() const {
         information(i, i) = own_information;
         covariance = inverse_of_information(information);
     }
-    const auto slots = knobs(errors);
+    const auto slots = free_parameters(errors);
     for (std::size_t i = 0; i < slots.size(); ++i) {
         const auto k = static_cast<Eigen::Index>(i);
         double sd = std::sqrt(std::max(0.0, covariance(k, k)));

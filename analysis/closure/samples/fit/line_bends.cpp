@@ -17,7 +17,7 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr std::size_t most_pieces = options.samples.lines.pieces.back();
-using Polynomials = std::array<double, LineCourse::most + 1>;
+using Polynomials = std::array<double, FrequencyTrack::most + 1>;
 
 /// Legendre polynomials. They are orthogonal, so that a start near the maximum converges in few steps.
 Polynomials legendre(double x) {
@@ -36,7 +36,7 @@ struct Cell {
     Polynomials at{};
 };
 
-std::vector<Cell> cells_about(const std::vector<double>& values, double rate_hz, const LineCourse& start,
+std::vector<Cell> cells_about(const std::vector<double>& values, double rate_hz, const FrequencyTrack& start,
                               double half_width_hz) {
     const std::size_t n = values.size();
     const auto turns = line_phase(n, rate_hz, start);
@@ -134,9 +134,9 @@ class Bending {
 };
 
 /// The start with the additional phase.
-LineCourse bent(LineCourse course, const Eigen::VectorXd& by, double duration_s) {
+FrequencyTrack bent(FrequencyTrack track, const Eigen::VectorXd& by, double duration_s) {
     // Legendre polynomials in powers of x
-    Eigen::MatrixXd powers = Eigen::MatrixXd::Zero(LineCourse::most + 1, LineCourse::most + 1);
+    Eigen::MatrixXd powers = Eigen::MatrixXd::Zero(FrequencyTrack::most + 1, FrequencyTrack::most + 1);
     powers(0, 0) = powers(1, 1) = 1.0;
     for (Eigen::Index k = 1; k + 1 < powers.rows(); ++k) {
         const auto n = static_cast<double>(k);
@@ -145,38 +145,38 @@ LineCourse bent(LineCourse course, const Eigen::VectorXd& by, double duration_s)
             (2.0 * n + 1.0) / (n + 1.0) * powers.row(k).head(powers.cols() - 1);
     }
     const Eigen::VectorXd turns = powers.middleRows(1, by.size()).transpose() * by;
-    for (std::size_t k = 0; k < LineCourse::most; ++k) {
-        course.coefficient(k) += turns(static_cast<Eigen::Index>(k) + 1) * LineCourse::a_cycle(k, duration_s);
+    for (std::size_t k = 0; k < FrequencyTrack::most; ++k) {
+        track.coefficient(k) += turns(static_cast<Eigen::Index>(k) + 1) * FrequencyTrack::a_cycle(k, duration_s);
     }
-    course.free = static_cast<std::size_t>(by.size());
-    return course;
+    track.free = static_cast<std::size_t>(by.size());
+    return track;
 }
 
 }  // namespace
 
-double places_of_bends(double chi2, double cycles, std::size_t coefficients) {
+double look_elsewhere_of_track(double chi2, double cycles, std::size_t coefficients) {
     constexpr double tracked = 2.0 * most_pieces * most_pieces;
-    double places = places_of_drift(chi2, cycles, tracked);
+    double trials = look_elsewhere_of_drift(chi2, cycles, tracked);
     for (std::size_t k = 3; k <= coefficients; ++k) {
         // With unit variance about the best phase the slope by a Legendre polynomial has the variance
         // (2 pi)^2/(2 k + 1).
-        places *= static_cast<double>(most_pieces) *
+        trials *= static_cast<double>(most_pieces) *
                   std::sqrt(units::two_pi * std::max(1.0, chi2) / (2.0 * static_cast<double>(k) + 1.0));
     }
-    return places;
+    return trials;
 }
 
-FoundCourse follow_bends(const std::vector<double>& values, double rate_hz, const FoundLines& found) {
+FoundTrack follow_bends(const std::vector<double>& values, double rate_hz, const FoundLines& found) {
     const double duration_s = static_cast<double>(values.size()) / rate_hz;
-    const LineCourse start = LineCourse::even(found.scattered_hz, found.scattered_drift_hz_per_s);
+    const FrequencyTrack start = FrequencyTrack::even(found.scattered_hz, found.scattered_drift_hz_per_s);
     const auto cells = cells_about(values, rate_hz, start, most_pieces / duration_s);
     double square = 0.0;
     for (const double x : values) square += x * x;
     double weight = 0.0;
     for (const Cell& cell : cells) weight += cell.weight;
-    FoundCourse best;
+    FoundTrack best;
     double most = 0.0;
-    for (std::size_t degree = 3; degree <= LineCourse::most; ++degree) {
+    for (std::size_t degree = 3; degree <= FrequencyTrack::most; ++degree) {
         Bending bending(cells, degree);
         bending.run(most_pieces);
         const double chi2 = 2.0 * bending.power() * weight / square;

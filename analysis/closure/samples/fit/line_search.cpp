@@ -121,9 +121,9 @@ bool stands_out(double chi2, double squares, const FoundLine& from) {
     return std::min(chi2, from.chi2) > options.samples.lines.certain ? squares > from.squares : chi2 > from.chi2;
 }
 
-void count_places(FoundLine& line, double places) {
-    line.searched = std::max(1.0, places);
-    line.p_value = of_several(chi2_tail(line.chi2, 2), line.searched);
+void set_look_elsewhere(FoundLine& line, double trials) {
+    line.look_elsewhere = std::max(1.0, trials);
+    line.p_value = of_several(chi2_tail(line.chi2, 2), line.look_elsewhere);
 }
 
 FoundLine still_line(const Spectrum& spectrum) {
@@ -135,7 +135,7 @@ FoundLine still_line(const Spectrum& spectrum) {
         if (!stands_out(chi2, squares, found) || spectrum.passed_over(hz)) continue;
         found = {.frequency_hz = hz, .chi2 = chi2, .squares = squares};
     }
-    count_places(found, places_of_frequency(found.chi2, spectrum.cycles()));
+    set_look_elsewhere(found, look_elsewhere_of_frequency(found.chi2, spectrum.cycles()));
     return found;
 }
 
@@ -166,7 +166,7 @@ FoundLine slow_line(const std::vector<double>& values, const Spectrum& spectrum)
             }
         }
     }
-    count_places(found, places_of_drift(found.chi2, spectrum.cycles(), 2.0 * most));
+    set_look_elsewhere(found, look_elsewhere_of_drift(found.chi2, spectrum.cycles(), 2.0 * most));
     return found;
 }
 
@@ -181,7 +181,7 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
     const std::size_t step = n / keep;
     const std::size_t slow = (n + step - 1) / step;
     const double low_rate = spectrum.rate_hz / static_cast<double>(step);
-    const auto phase = line_phase(n, spectrum.rate_hz, LineCourse::even(centre_hz, drift));
+    const auto phase = line_phase(n, spectrum.rate_hz, FrequencyTrack::even(centre_hz, drift));
     std::vector<Complex> low(slow, 0.0);
     for (std::size_t i = 0; i < n; ++i) low[i / step] += values[i] * std::polar(1.0, -phase[i]);
     const std::size_t padded = power_of_two(4 * slow);
@@ -294,17 +294,17 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
     const double near_cycles = options.samples.lines.near_cycles;
     lines.tracked = follow(values, spectrum, tracked_hz, near_cycles / spectrum.duration_s, tracked_drift,
                            static_cast<int>(near_cycles));
-    count_places(lines.tracked, places_of_drift(lines.tracked.chi2, spectrum.cycles(), drift_cycles));
+    set_look_elsewhere(lines.tracked, look_elsewhere_of_drift(lines.tracked.chi2, spectrum.cycles(), drift_cycles));
     lines.tracked.p_value = std::min(1.0, 2.0 * std::min(lines.tracked.p_value, least));
 }
 
 }  // namespace
 
-double places_of_drift(double chi2, double cycles, double drift_cycles) {
+double look_elsewhere_of_drift(double chi2, double cycles, double drift_cycles) {
     // With unit variance about the best phase the slopes by frequency and drift have the variances (2 pi)^2 T^2/12 and
     // pi^2 T^4/180; the density of the field is (chi2 - 1) exp(-chi2/2)/(2 pi).
     const double inside = units::pi / std::sqrt(2160.0) * cycles * drift_cycles * std::max(0.0, chi2 - 1.0);
-    return places_of_frequency(chi2, cycles) + inside;
+    return look_elsewhere_of_frequency(chi2, cycles) + inside;
 }
 
 FoundLine FoundLines::likeliest() const {
@@ -315,7 +315,7 @@ FoundLine FoundLines::likeliest() const {
         if (other.p_value < best.p_value || as_rare) best = other;
     }
     const double kinds = options.samples.lines.kinds;
-    best.searched *= kinds;
+    best.look_elsewhere *= kinds;
     best.p_value = of_several(best.p_value, kinds);
     return best;
 }
@@ -346,9 +346,9 @@ NarrowLines find_lines_in(const std::vector<double>& values, double rate_hz, con
     const auto steps = static_cast<int>(std::ceil(drift_cycles));
     NarrowLines found;
     found.still = follow(values, spectrum, band.centre_hz, band.half_width_hz, 0.0, 0);
-    count_places(found.still, places_of_frequency(found.still.chi2, cycles));
+    set_look_elsewhere(found.still, look_elsewhere_of_frequency(found.still.chi2, cycles));
     found.drifting = follow(values, spectrum, band.centre_hz, band.half_width_hz, 0.0, steps);
-    count_places(found.drifting, places_of_drift(found.drifting.chi2, cycles, 2.0 * steps));
+    set_look_elsewhere(found.drifting, look_elsewhere_of_drift(found.drifting.chi2, cycles, 2.0 * steps));
     return found;
 }
 

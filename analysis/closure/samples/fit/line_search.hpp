@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "analysis/closure/samples/model/line_course.hpp"
+#include "analysis/closure/samples/model/frequency_track.hpp"
 
 /// Search for lines in a series of white innovations, with the probability of the largest one by chance.
 namespace ringlock::closure {
@@ -12,10 +12,10 @@ namespace ringlock::closure {
 struct FoundLine {
     double frequency_hz = 0.0;  ///< in the middle of the rows
     double drift_hz_per_s = 0.0;
-    double chi2 = 0.0;      ///< of its two amplitudes, at this frequency and drift
-    double p_value = 1.0;   ///< with the look-elsewhere correction of its search
-    double searched = 1.0;  ///< look-elsewhere factor of this search at that chi2
-    double squares = 0.0;   ///< its part of the sum of the values' squares
+    double chi2 = 0.0;            ///< of its two amplitudes, at this frequency and drift
+    double p_value = 1.0;         ///< with the look-elsewhere correction of its search
+    double look_elsewhere = 1.0;  ///< look-elsewhere factor of this search at that chi2
+    double squares = 0.0;         ///< its part of the sum of the values' squares
 };
 
 /// Three searches for lines: of constant frequency; with a drift of a few cycles over the record, the phase followed
@@ -40,14 +40,14 @@ FoundLine find_still_line(const std::vector<double>& values, double rate_hz, con
 
 /// A line on a curved frequency track whose phase is followed over the whole record. The search starts from the power
 /// that stands out in pieces: first with the phases within pieces alone, then with fewer and longer pieces.
-struct FoundCourse {
-    LineCourse course;
+struct FoundTrack {
+    FrequencyTrack track;
     double chi2 = 0.0;  ///< of its two amplitudes
 };
 /// Look-elsewhere factor of a search over curved tracks: that of a line with a drift of up to the limit of the tracks,
 /// times, for each further coefficient, that of half a cycle per piece.
-double places_of_bends(double chi2, double cycles, std::size_t coefficients);
-FoundCourse follow_bends(const std::vector<double>& values, double rate_hz, const FoundLines& found);
+double look_elsewhere_of_track(double chi2, double cycles, std::size_t coefficients);
+FoundTrack follow_bends(const std::vector<double>& values, double rate_hz, const FoundLines& found);
 
 /// A narrow band about an expected line.
 struct LineBand {
@@ -64,7 +64,7 @@ NarrowLines find_lines_in(const std::vector<double>& values, double rate_hz, con
 /// the range of frequencies times the record's length, `drift_cycles` that of drifts times the square of the length,
 /// both signs together. Euler characteristic of a chi-squared field above that level (Worsley, Adv. Appl. Prob. 26,
 /// 1994, 13).
-double places_of_drift(double chi2, double cycles, double drift_cycles);
+double look_elsewhere_of_drift(double chi2, double cycles, double drift_cycles);
 
 /// Squared magnitudes of the Fourier transform of real values, padded with zeros, below half the rate.
 std::vector<double> periodogram(const std::vector<double>& values, std::size_t padded);

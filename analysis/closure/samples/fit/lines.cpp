@@ -13,42 +13,42 @@ namespace ringlock::closure {
 namespace {
 
 /// Limits a step of the coefficients to the range in which the linearisation holds.
-void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration_s) {
-    if (course.free <= 2) {
+void step_path(FrequencyTrack& track, const Eigen::VectorXd& off, double duration_s) {
+    if (track.free <= 2) {
         const double most = 2.0 / (duration_s * duration_s);
-        course.hz += std::clamp(off[0], -0.3 / duration_s, 0.3 / duration_s);
-        if (course.free == 2) course.drifts[0] += std::clamp(off[1], -most, most);
+        track.hz += std::clamp(off[0], -0.3 / duration_s, 0.3 / duration_s);
+        if (track.free == 2) track.drifts[0] += std::clamp(off[1], -most, most);
         return;
     }
     // Coefficients of a polynomial compensate each other: all have the same factor.
     constexpr double most_cycles = 0.3;
-    constexpr int places = 64;
+    constexpr int positions = 64;
     double share = 1.0;
-    LineCourse step;
-    for (std::size_t k = 0; k < course.free; ++k) step.coefficient(k) = off[static_cast<Eigen::Index>(k)];
-    for (int i = -places; i <= places; ++i) {
-        const double turns = std::abs(step.turns(0.5 * duration_s * i / places));
+    FrequencyTrack step;
+    for (std::size_t k = 0; k < track.free; ++k) step.coefficient(k) = off[static_cast<Eigen::Index>(k)];
+    for (int i = -positions; i <= positions; ++i) {
+        const double turns = std::abs(step.turns(0.5 * duration_s * i / positions));
         if (share * turns > most_cycles) share = most_cycles / turns;
     }
-    for (std::size_t k = 0; k < course.free; ++k) course.coefficient(k) += share * step.coefficient(k);
+    for (std::size_t k = 0; k < track.free; ++k) track.coefficient(k) += share * step.coefficient(k);
 }
 
 SampleLine refined_from(const SampleFit& fit, SampleLine line) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
-    const int most = line.course.free > 2 ? 20 : 6;
+    const int most = line.track.free > 2 ? 20 : 6;
     for (int round = 0; round < most; ++round) {
-        auto columns = fit.line(line.course);
+        auto columns = fit.line(line.track);
         const auto score = fit.score(columns);
         if (score.rank < 2) return line;
         line.chi2 = score.chi2;
-        for (auto& slope : line_slopes(fit, line.course, score.value[0], score.value[1])) {
+        for (auto& slope : line_slopes(fit, line.track, score.value[0], score.value[1])) {
             columns.push_back(std::move(slope));
         }
         const auto all = fit.score(columns);
         SampleLine next = line;
-        step_course(next.course, Eigen::VectorXd::Map(&all.value[2], static_cast<Eigen::Index>(line.course.free)),
-                    duration_s);
-        next.chi2 = fit.score(fit.line(next.course)).chi2;
+        step_path(next.track, Eigen::VectorXd::Map(&all.value[2], static_cast<Eigen::Index>(line.track.free)),
+                  duration_s);
+        next.chi2 = fit.score(fit.line(next.track)).chi2;
         if (!(next.chi2 > line.chi2)) break;
         const double gained = next.chi2 - line.chi2;
         line = next;
@@ -59,18 +59,18 @@ SampleLine refined_from(const SampleFit& fit, SampleLine line) {
 
 }  // namespace
 
-std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b) {
+std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const FrequencyTrack& track, double a, double b) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
     // So small a part of a cycle at either end of the record that the next order does not matter.
     constexpr double part = 1e-4;
     std::vector<std::vector<double>> slopes;
-    for (std::size_t k = 0; k < course.free; ++k) {
-        const double off = part * LineCourse::a_cycle(k, duration_s);
-        LineCourse beside = course;
-        beside.coefficient(k) += off;
-        const auto more = fit.line(beside);
-        beside.coefficient(k) -= 2.0 * off;
-        const auto less = fit.line(beside);
+    for (std::size_t k = 0; k < track.free; ++k) {
+        const double off = part * FrequencyTrack::a_cycle(k, duration_s);
+        FrequencyTrack shifted = track;
+        shifted.coefficient(k) += off;
+        const auto more = fit.line(shifted);
+        shifted.coefficient(k) -= 2.0 * off;
+        const auto less = fit.line(shifted);
         std::vector<double>& slope = slopes.emplace_back(more[0].size());
         for (std::size_t i = 0; i < slope.size(); ++i) {
             slope[i] = 0.5 / off * (a * (more[0][i] - less[0][i]) + b * (more[1][i] - less[1][i]));
@@ -79,15 +79,15 @@ std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCou
     return slopes;
 }
 
-void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const LineCourse& course) {
-    auto columns = line_columns(series.size(), series.rate_hz, course);
+void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const FrequencyTrack& track) {
+    auto columns = line_columns(series.size(), series.rate_hz, track);
     for (std::size_t k = 0; k < 2; ++k) {
         model.columns[cosine + k].series = std::make_shared<const std::vector<double>>(std::move(columns[k]));
-        model.columns[cosine + k].course = course;
+        model.columns[cosine + k].track = track;
     }
 }
 
-SampleLine refine_line(const SampleFit& fit, const LineCourse& shown) {
+SampleLine refine_line(const SampleFit& fit, const FrequencyTrack& shown) {
     SampleLine best{shown, -1.0};
     for (const Alias& of : of_source(shown.hz, fit.series().rate_hz, fit.model().noise.from_hz)) {
         const SampleLine line = refined_from(fit, {shown.shown_at(of.hz, of.folded)});
@@ -101,7 +101,7 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     if (!(found.scattered > line.chi2 + lines.much_scattered)) return false;
     // A strong line raises the level about it, over which powers are measured, and hides others near it. The residual
     // must therefore have a large part of the line's own power as well as of that over the level.
-    const auto columns = fit.line(line.course);
+    const auto columns = fit.line(line.track);
     const auto score = fit.score(columns);
     for (std::size_t c = 0; c < columns.size(); ++c) {
         const auto white = fit.filter().apply(columns[c]);
@@ -110,7 +110,7 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
         }
     }
     const FoundLines left = find_lines(innovations, fit.series().rate_hz);
-    const bool same = std::abs(left.scattered_hz - found.scattered_hz) < lines.beside_hz;
+    const bool same = std::abs(left.scattered_hz - found.scattered_hz) < lines.adjacent_hz;
     return same && left.scattered > found.scattered / lines.left_parts + lines.much_scattered &&
            left.scattered_squares > found.scattered_squares / lines.left_parts;
 }
@@ -146,12 +146,12 @@ SampleFit refine_lines(SampleFit fit, const Rows& rows) {
             const SampleColumn& cosine = model.columns[k];
             if (cosine.name != "cosine") continue;
             any = true;
-            LineCourse course = cosine.course;
-            const auto score = fit.score(line_slopes(fit, course, cosine.value, model.columns[k + 1].value));
+            FrequencyTrack track = cosine.track;
+            const auto score = fit.score(line_slopes(fit, track, cosine.value, model.columns[k + 1].value));
             // The limit of a step holds a frequency that is not determined to within a cycle over the record.
-            step_course(course, Eigen::VectorXd::Map(score.value.data(), static_cast<Eigen::Index>(course.free)),
-                        duration_s);
-            set_line(model, k, series, course);
+            step_path(track, Eigen::VectorXd::Map(score.value.data(), static_cast<Eigen::Index>(track.free)),
+                      duration_s);
+            set_line(model, k, series, track);
         }
         if (!any) break;
         fit = SampleFit(series, std::move(model), rows, SampleFit::Noise::near);

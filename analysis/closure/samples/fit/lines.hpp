@@ -9,19 +9,19 @@ namespace ringlock::closure {
 
 /// a cos + b sin of 2 pi times the cycles of the frequency track.
 struct SampleLine {
-    LineCourse course;
+    FrequencyTrack track;
     double chi2 = 0.0;  ///< explained by its two amplitudes
 };
 
 /// Derivatives of a line with amplitudes a and b, by its frequency and by each free drift, as the record contains it.
-std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b);
+std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const FrequencyTrack& track, double a, double b);
 
 /// Sets the two columns of a line, of which `cosine` is the first, to another frequency track.
-void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const LineCourse& course);
+void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const FrequencyTrack& track);
 
 /// Fits a line by Gauss and Newton from its place in the innovations, in the rows that count, next to a model without
 /// this line. In a resampled record every frequency of the source that appears there is tried.
-SampleLine refine_line(const SampleFit& fit, const LineCourse& shown);
+SampleLine refine_line(const SampleFit& fit, const FrequencyTrack& shown);
 
 /// Whether the power that stands out in pieces of the innovations belongs to a line without constant phase: it remains
 /// when the line of constant phase that explains most is removed. The innovations are zero in rows that do not count.

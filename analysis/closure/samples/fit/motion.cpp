@@ -56,10 +56,10 @@ enum class ResonanceStart { about_the_motion, at_half_the_rate };
 
 /// The noise with two resonances for the unpredicted part of a motion, the most likely of many starts: no mean over
 /// frequencies shows their widths, and the likelihood has several maxima.
-SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, double rms_arcsec, double hz,
+SampleNoise begun_with(const SampleFit& now, const std::vector<double>& predicted, double rms_arcsec, double hz,
                        ResonanceStart where) {
     const SampleSeries& series = now.series();
-    std::vector<double> rest = now.as_taken(told);
+    std::vector<double> rest = now.as_taken(predicted);
     for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = now.rest()[i] - rest[i];
     // The noise of the model so far contains most of the motion. Second differences of the increments are mostly white
     // angle.
@@ -101,13 +101,13 @@ SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::s
     model.motion = motion.increments;
     model.motion_from_hz = options.samples.fit.slowest_of_motion * motion.centre_hz;
     // The unpredicted part moves like the predicted one; the witness's own noise hides its edges, which are wider.
-    const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
+    const double incoherent = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);
     model.resonances.insert(model.resonances.end(), 2, {&effect, step});
     std::optional<SampleFit> first;
     for (const ResonanceStart where : {ResonanceStart::about_the_motion, ResonanceStart::at_half_the_rate}) {
         SampleModel trial = model;
-        trial.noise = begun_with(now, motion.increments, untold, centre_hz, where);
+        trial.noise = begun_with(now, motion.increments, incoherent, centre_hz, where);
         SampleFit fit(now.series(), std::move(trial), now.rows());
         // A narrow resonance elsewhere is a line and no part of the motion.
         const bool line = where == ResonanceStart::at_half_the_rate &&

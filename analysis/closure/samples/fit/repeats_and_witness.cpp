@@ -82,7 +82,7 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
         if (p < found.p_value) {
             found.p_value = p;
             found.frequency_hz = hz;
-            found.searched = line.searched;
+            found.look_elsewhere = line.look_elsewhere;
         }
     }
     return found;
@@ -248,7 +248,7 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
         filled = 0;
     };
     for (std::size_t i = static_cast<std::size_t>(lags); i + static_cast<std::size_t>(lags) < n; ++i) {
-        if (!fit.telling()[i]) continue;
+        if (!fit.informative()[i]) continue;
         for (int l = 0; l < taps; ++l) block(filled, l) = white.at(i, l);
         target(filled++) = e[i];
         if (filled == block.rows()) flush();

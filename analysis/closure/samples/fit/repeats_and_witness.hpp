@@ -10,7 +10,7 @@ namespace ringlock::closure {
 struct FoundCycle {
     double frequency_hz = 0.0;
     double p_value = 1.0;
-    double searched = 1.0;
+    double look_elsewhere = 1.0;
 };
 FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, double rate_hz);
 

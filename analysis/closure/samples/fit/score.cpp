@@ -13,7 +13,7 @@ SampleScore score_of(const SampleFit& fit, const Rows& reported, double lattice_
     score.log_likelihood = fit.log_likelihood();
     double count = 0.0;
     for (std::size_t i = 0; i < reported.size(); ++i) {
-        if (!reported[i] || fit.settled(i)) continue;
+        if (!reported[i] || fit.deterministic(i)) continue;
         const double sd = fit.sd(i);
         double e = fit.innovations()[i] * sd;
         score.log_score -= 0.5 * e * e / (sd * sd) + std::log(sd) + 0.5 * std::log(units::two_pi);

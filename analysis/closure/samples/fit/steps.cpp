@@ -36,7 +36,7 @@ double root_of_step(const SampleFit& fit, std::size_t row) {
     return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(score.chi2), score.value[0]);
 }
 
-std::optional<Jump> jump_beside_random(const SampleFit& fit) {
+std::optional<Jump> jump_with_random_rate(const SampleFit& fit) {
     if (!fit.model().walk && !fit.model().flicker) return std::nullopt;
     const std::vector<double> step = step_at(fit.series(), fit.series().size() / 2);
     return largest_jump(fit.innovations(), fit.rows(), fit.filter().apply(step));
@@ -44,7 +44,7 @@ std::optional<Jump> jump_beside_random(const SampleFit& fit) {
 
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
     // Nearer to an end a step is hardly distinguished from the start or the end of the record.
-    const std::size_t first = std::max<std::size_t>(1, without.series().size() / options.samples.fit.places_of_a_step);
+    const std::size_t first = std::max<std::size_t>(1, without.series().size() / options.samples.fit.positions_of_step);
     const std::size_t last = without.series().size() - 1 - first;
     double best = std::abs(root_of_step(without, row));
     for (std::size_t d = reach; d > 0; d /= 2) {
@@ -87,7 +87,7 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
             if (!is_step(fit.model().columns[k])) continue;
             const std::size_t row = row_of_step(fit.model().columns[k]);
             const std::size_t at = refine_place(without_column(fit, k, rows), row,
-                                                fit.series().size() / (2 * options.samples.fit.places_of_a_step));
+                                                fit.series().size() / (2 * options.samples.fit.positions_of_step));
             if (at == row) continue;
             moved = true;
             fit = with_place(fit, k, at, rows);
@@ -98,7 +98,7 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
 }
 
 SampleFit place_in_gaps(SampleFit fit, const Rows& rows, const Rows& known) {
-    const std::size_t places = options.samples.fit.places_in_a_gap;
+    const std::size_t positions = options.samples.fit.positions_in_gap;
     for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
         if (!is_step(fit.model().columns[k])) continue;
         const std::size_t row = row_of_step(fit.model().columns[k]);
@@ -112,13 +112,13 @@ SampleFit place_in_gaps(SampleFit fit, const Rows& rows, const Rows& known) {
         const SampleFit without = without_column(fit, k, all);
         std::size_t at = row;
         double most = 0.0;
-        for (std::size_t p = 0; p <= places; ++p) {
-            const std::size_t place = from + (to - from) * p / places;
+        for (std::size_t p = 0; p <= positions; ++p) {
+            const std::size_t place = from + (to - from) * p / positions;
             const double root = std::abs(root_of_step(without, place));
             if (root > most) at = place;
             most = std::max(most, root);
         }
-        at = refine_place(without, at, std::max<std::size_t>(1, (to - from) / (2 * places)));
+        at = refine_place(without, at, std::max<std::size_t>(1, (to - from) / (2 * positions)));
         if (at != row) fit = with_place(fit, k, at, rows);
     }
     return fit;

@@ -17,7 +17,7 @@ std::size_t row_of_step(const SampleColumn& step);
 double root_of_step(const SampleFit& fit, std::size_t row);
 
 /// The largest jump in the innovations of a model with a random rate, which decays soon after a step; else no value.
-std::optional<Jump> jump_beside_random(const SampleFit& fit);
+std::optional<Jump> jump_with_random_rate(const SampleFit& fit);
 
 /// Row of the step that explains most near that row: within `reach` rows, by repeated halving. The model has no step.
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach);

@@ -11,7 +11,7 @@ namespace ringlock::closure {
 
 Swing swing_of_variance(const SampleFit& fit, double hz) {
     const auto& e = fit.innovations();
-    const auto phase = line_phase(e.size(), fit.series().rate_hz, LineCourse::still(hz));
+    const auto phase = line_phase(e.size(), fit.series().rate_hz, FrequencyTrack::still(hz));
     Swing swing;
     double mean = 0.0;
     for (int round = 0; round < 8; ++round) {
@@ -19,7 +19,7 @@ Swing swing_of_variance(const SampleFit& fit, double hz) {
         Eigen::Vector3d slope = Eigen::Vector3d::Zero();
         swing.gain = 0.0;
         for (std::size_t i = 0; i < e.size(); ++i) {
-            if (!fit.telling()[i]) continue;
+            if (!fit.informative()[i]) continue;
             const Eigen::Vector3d x(1.0, std::cos(phase[i]), std::sin(phase[i]));
             const double log_variance = mean * x(0) + swing.cos * x(1) + swing.sin * x(2);
             const double ratio = e[i] * e[i] * std::exp(-log_variance);
@@ -38,7 +38,7 @@ Swing swing_of_variance(const SampleFit& fit, double hz) {
 
 SampleFit with_swinging_errors(const SampleFit& fit, double hz, const Swing& seen) {
     SampleModel model = fit.model();
-    const auto phase = line_phase(1, fit.series().rate_hz, LineCourse::still(hz))[0];
+    const auto phase = line_phase(1, fit.series().rate_hz, FrequencyTrack::still(hz))[0];
     // The model's oscillation is relative to the start of the record, that of the innovations to its middle.
     model.noise.swing_hz = hz;
     model.noise.swing_cos = seen.cos * std::cos(phase) + seen.sin * std::sin(phase);

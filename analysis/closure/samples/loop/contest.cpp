@@ -12,7 +12,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
-#include "analysis/closure/samples/loop/rivals.hpp"
+#include "analysis/closure/samples/loop/competing_tests.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/interrupt.hpp"
 
@@ -25,7 +25,7 @@ namespace {
 bool shows(const SampleCandidate& candidate, OnSamples as) { return on_samples(*candidate.effect) == as; }
 
 double p_of_gain(double gain, const SampleCandidate& candidate) {
-    return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
+    return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.look_elsewhere);
 }
 
 /// Compares all effects that may be added to one state of the model.
@@ -47,7 +47,7 @@ class Contest {
     /// A candidate model: one effect, or several, each fitted with those before it.
     struct CandidateSet {
         std::vector<Shared> members;
-        double merit = 0.0;
+        double evidence = 0.0;
         double p_value = 1.0;  ///< of the first, given the second
 
         bool has(const effects::Effect* effect) const;
@@ -61,17 +61,18 @@ class Contest {
     Shared placed(Shared first, const SampleModel& all) const;
     void add_weak_random(const std::vector<SampleCandidate>& candidates, const std::vector<Shared>& all, double least,
                          std::vector<CandidateSet>& as_likely) const;
-    std::vector<Shared> contenders(const SampleState& state, std::vector<SampleCandidate> candidates) const;
-    SampleState beside(const SampleState& state, const SampleCandidate& contender) const;
+    std::vector<Shared> finalists(const SampleState& state, std::vector<SampleCandidate> candidates) const;
+    SampleState with_finalist(const SampleState& state, const SampleCandidate& finalist) const;
     std::vector<CandidateSet> sets(const std::vector<Shared>& all,
                                    const std::vector<SampleCandidate>& candidates) const;
     std::vector<CandidateSet> sets_from(const Shared& first, const std::vector<Shared>& firsts,
                                         const std::vector<SampleCandidate>& candidates) const;
-    double p_beside(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
-                    const std::vector<SampleCandidate>& candidates) const;
-    static double bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows);
-    bool beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const;
-    Shared set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const;
+    double p_given_first(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
+                         const std::vector<SampleCandidate>& candidates) const;
+    static double evidence_to_exceed(const CandidateSet& set, const std::vector<CompetingTest>& competing_tests,
+                                     std::size_t rows);
+    bool improve_each_other(const SampleCandidate& a, const SampleCandidate& b) const;
+    Shared set_aside(std::vector<Shared>& all, const std::vector<CompetingTest>& against) const;
     static Shared nearest(const std::vector<Shared>& all, const Shared& unnamed);
     void tie_sources(SampleChoice& choice) const;
     static void tie(const CandidateSet& best, const std::vector<CandidateSet>& as_likely, SampleChoice& choice);
@@ -123,9 +124,9 @@ Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candid
 Contest::Shared Contest::judged(const SampleState& state, SampleCandidate candidate, SampleFit fit) const {
     candidate.fit = std::make_shared<SampleFit>(std::move(fit));
     const double gain = candidate.fit->gain_over(*state.fit);
-    candidate.merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
+    candidate.evidence = gain - std::log(candidate.positions.value_or(candidate.look_elsewhere)) - candidate.parameters;
     // The score tests use the noise so far; the gain of the effect is that of a full fit.
-    candidate.passes = candidate.merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
+    candidate.passes = candidate.evidence > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
     return std::make_shared<SampleCandidate>(std::move(candidate));
 }
 
@@ -142,8 +143,8 @@ Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
 
 /// Candidates of the score tests that pass when they are fitted in full, the most likely first. Slow rates and lines
 /// are fitted at weaker scores as well, since the noise of the score tests may have absorbed them.
-std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
-                                                 std::vector<SampleCandidate> candidates) const {
+std::vector<Contest::Shared> Contest::finalists(const SampleState& state,
+                                                std::vector<SampleCandidate> candidates) const {
     std::erase_if(candidates, [](const SampleCandidate& candidate) {
         const bool worth = (is_slow_rate(*candidate.effect) || is_line(*candidate.effect)) &&
                            candidate.p_value < options.samples.contest.worth_looking;
@@ -170,31 +171,31 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
     fit_all(std::move(candidates));
     double most = 0.0;
     double most_resampled = 0.0;
-    for (const Shared& contender : all) {
-        if (is_slow_rate(*contender->effect)) continue;
-        double& of_these = resampled(*contender) ? most_resampled : most;
-        of_these = std::max(of_these, contender->merit);
+    for (const Shared& finalist : all) {
+        if (is_slow_rate(*finalist->effect)) continue;
+        double& of_these = resampled(*finalist) ? most_resampled : most;
+        of_these = std::max(of_these, finalist->evidence);
     }
     if (!(most_resampled > 0.0 && most_resampled < by.far * most)) fit_all(std::move(later));
-    std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
-    std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
+    std::erase_if(all, [](const Shared& finalist) { return !finalist->passes; });
+    std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->evidence > b->evidence; });
     // Rates of a source take no place from other candidates.
     std::size_t count = 0;
     std::size_t count_resampled = 0;
-    std::erase_if(all, [&](const Shared& contender) {
-        std::size_t& of_these = resampled(*contender) ? count_resampled : count;
-        return of_these++ >= options.most_contenders + by.more_contenders;
+    std::erase_if(all, [&](const Shared& finalist) {
+        std::size_t& of_these = resampled(*finalist) ? count_resampled : count;
+        return of_these++ >= options.most_finalists + by.more_finalists;
     });
     return all;
 }
 
-SampleState Contest::beside(const SampleState& state, const SampleCandidate& contender) const {
-    return {contender.fit, state.lines_hz, state.step + 1, state.random_rates, state.source};
+SampleState Contest::with_finalist(const SampleState& state, const SampleCandidate& finalist) const {
+    return {finalist.fit, state.lines_hz, state.step + 1, state.random_rates, state.source};
 }
 
 /// Probability of the gain by the first over the second alone; of the gain by both, if the first does not pass alone.
-double Contest::p_beside(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
-                         const std::vector<SampleCandidate>& candidates) const {
+double Contest::p_given_first(const SampleCandidate& first, const SampleCandidate& second,
+                              const std::vector<Shared>& firsts, const std::vector<SampleCandidate>& candidates) const {
     const double others = 0.5 * (effects_on_samples() - 1.0);  // of all pairs, for each effect
     const effects::Effect* effect = second.effect;
     const auto fitted_already =
@@ -212,7 +213,7 @@ double Contest::p_beside(const SampleCandidate& first, const SampleCandidate& se
     if (first.passes) return p;
     const double both = second.fit->gain_over(*now_.fit);
     return std::max(p, of_several(chi2_tail(2.0 * both, first.freedom + second.freedom),
-                                  others * first.searched * second.searched));
+                                  others * first.look_elsewhere * second.look_elsewhere));
 }
 
 /// Sets that start from one effect: with the most likely random rate; with the most likely other rate; and with that
@@ -222,22 +223,22 @@ std::vector<Contest::CandidateSet> Contest::sets_from(const Shared& first, const
     // Cost of the choice among so many other effects.
     const double choice = std::log(effects_on_samples());
     std::vector<CandidateSet> found;
-    const SampleState with_first = beside(now_, *first);
-    const auto seconds = contenders(with_first, screened(with_first, Wanted::slow));
+    const SampleState with_first = with_finalist(now_, *first);
+    const auto seconds = finalists(with_first, screened(with_first, Wanted::slow));
     for (const bool random : {false, true}) {
         const auto second = std::find_if(seconds.begin(), seconds.end(), [&](const Shared& c) {
             return is_slow_rate(*c->effect) && is_random_rate(*c->effect) == random;
         });
         if (second == seconds.end()) continue;
-        const double p = p_beside(*first, **second, firsts, candidates);
+        const double p = p_given_first(*first, **second, firsts, candidates);
         if (!passes_on_samples(p)) continue;
-        const double merit = first->merit + (*second)->merit - choice;
-        found.push_back({{first, *second}, merit, p});
+        const double evidence = first->evidence + (*second)->evidence - choice;
+        found.push_back({{first, *second}, evidence, p});
         if (random || is_random_rate(*first->effect)) continue;
-        const SampleState with_both = beside(with_first, **second);
-        for (const Shared& third : contenders(with_both, screened(with_both, Wanted::slow))) {
+        const SampleState with_both = with_finalist(with_first, **second);
+        for (const Shared& third : finalists(with_both, screened(with_both, Wanted::slow))) {
             if (!is_slow_rate(*third->effect) || is_random_rate(*third->effect)) continue;
-            found.push_back({{first, *second, third}, merit + third->merit - choice, p});
+            found.push_back({{first, *second, third}, evidence + third->evidence - choice, p});
             break;
         }
     }
@@ -251,11 +252,11 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
     const std::size_t starts = options.samples.contest.set_starts;
     std::vector<Shared> firsts;
     bool random = false;
-    for (const Shared& contender : all) {
-        if (!is_slow_rate(*contender->effect)) continue;
+    for (const Shared& finalist : all) {
+        if (!is_slow_rate(*finalist->effect)) continue;
         // One random rate can substitute for another.
-        if (is_random_rate(*contender->effect) && std::exchange(random, true)) continue;
-        firsts.push_back(contender);
+        if (is_random_rate(*finalist->effect) && std::exchange(random, true)) continue;
+        firsts.push_back(finalist);
     }
     for (const SampleCandidate& candidate : candidates) {
         const bool known =
@@ -263,7 +264,7 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
         if (known || !is_slow_rate(*candidate.effect) || is_random_rate(*candidate.effect)) continue;
         if (candidate.p_value < options.samples.contest.worth_looking) firsts.push_back(fitted(now_, candidate));
     }
-    std::sort(firsts.begin(), firsts.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
+    std::sort(firsts.begin(), firsts.end(), [](const Shared& a, const Shared& b) { return a->evidence > b->evidence; });
     if (firsts.size() > starts + (random ? 1 : 0)) firsts.resize(starts + (random ? 1 : 0));
     std::vector<std::vector<CandidateSet>> found(firsts.size());
     oneapi::tbb::parallel_for(std::size_t{0}, firsts.size(),
@@ -275,52 +276,54 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
 
 /// Evidence that a set must exceed: where a residual test explains more, the set only substitutes for a cause that is
 /// not in the library. A residual test is preferred to an effect if it explains more by the margins below.
-double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows) {
+double Contest::evidence_to_exceed(const CandidateSet& set, const std::vector<CompetingTest>& competing_tests,
+                                   std::size_t rows) {
     const bool random = set.random();
     const bool moves = std::all_of(set.members.begin(), set.members.end(), [](const Shared& member) {
         return is_slow_rate(*member->effect) || is_line(*member->effect);
     });
     double most = 0.0;
-    for (const Rival& rival : rivals) {
+    for (const CompetingTest& competing : competing_tests) {
         // A varying size of the noise does not look like a rate or a line, nor do these look like it.
-        if (rival.repeats && moves) continue;
+        if (competing.repeats && moves) continue;
         // A line is not explained by another one that is far from it.
         const SampleCandidate& first = *set.members.front();
-        if (rival.hz && set.members.size() == 1 && is_line(*first.effect) &&
-            std::abs(*rival.hz - first.hz) > options.samples.lines.beside_hz) {
+        if (competing.hz && set.members.size() == 1 && is_line(*first.effect) &&
+            std::abs(*competing.hz - first.hz) > options.samples.lines.adjacent_hz) {
             continue;
         }
-        double merit = set.has(OnSamples::motion) ? rival.of_a_motion : rival.merit;
+        double evidence = set.has(OnSamples::motion) ? competing.of_a_motion : competing.evidence;
         // A line of constant phase, or interpolation of readings, leaves no power of a strong line; a resonance follows
         // any line.
         const bool keeps = is_line(*first.effect) ? !first.wanders : shows(first, OnSamples::transport);
-        if (keeps && rival.by_variance) merit = *rival.by_variance;
-        if (rival.repeats && set.has(OnSamples::transport)) {
+        if (keeps && competing.by_variance) evidence = *competing.by_variance;
+        if (competing.repeats && set.has(OnSamples::transport)) {
             // Interpolation on straight lines makes the variance oscillate by one half exactly. Blur reduces that, and
             // any other oscillation may be smaller as well.
             const SampleNoise& noise = set.members.front()->fit->model().noise;
-            merit +=
+            evidence +=
                 noise.blur_arcsec < options.samples.contest.blurred * noise.angle_arcsec ? -options.tie : options.tie;
-            most = std::max(most, merit);
+            most = std::max(most, evidence);
             continue;
         }
         // A set is chosen from many: against a test of another column of the record it has no margin for being in the
         // library. A trend in time follows all columns.
-        double more = set.members.size() > 1 && rival.where != Where::time ? 0.0 : -options.tie;
+        double more = set.members.size() > 1 && competing.where != Where::time ? 0.0 : -options.tie;
         // The likelihood of a random process is integrated over its path: the coefficients of a trend in time must be
         // integrated out as well (Schwarz 1978).
-        if (random) merit -= rival.courses * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
-        if (random && (rival.where != Where::time || rival.jumps)) {
+        if (random) evidence -= competing.trends * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
+        if (random && (competing.where != Where::time || competing.jumps)) {
             // A random rate can follow jumps, or another column of the record, nearly as well as their regression. The
             // times of jumps are searched stretch by stretch, which loses a part of their gain.
-            more = rival.jumps ? std::max(options.tie, options.samples.contest.lost_of_jumps * set.merit) : options.tie;
-        } else if (!random && rival.jumps && set.members.size() > 1) {
+            more = competing.jumps ? std::max(options.tie, options.samples.contest.lost_of_jumps * set.evidence)
+                                   : options.tie;
+        } else if (!random && competing.jumps && set.members.size() > 1) {
             more = options.tie;
         }
-        most = std::max(most, merit + more);
+        most = std::max(most, evidence + more);
         // A chain of states is a random process as well: within a tie the record does not distinguish it from a random
         // rate.
-        if (rival.of_states) most = std::max(most, *rival.of_states + (random ? options.tie : -options.tie));
+        if (competing.of_states) most = std::max(most, *competing.of_states + (random ? options.tie : -options.tie));
     }
     return most;
 }
@@ -337,15 +340,15 @@ void Contest::add_weak_random(const std::vector<SampleCandidate>& candidates, co
             std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->effect == candidate.effect; });
         if (known) continue;
         const Shared weak = fitted(now_, candidate);
-        if (weak->merit > least) as_likely.push_back({{weak}, weak->merit, weak->p_value});
+        if (weak->evidence > least) as_likely.push_back({{weak}, weak->evidence, weak->p_value});
     }
 }
 
 /// True if one of two effects of different kinds still improves the fit when the other is present. Two such effects are
 /// not alternatives, even if their evidence is equal.
-bool Contest::beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const {
-    const auto kind = [](const SampleCandidate& contender) {
-        const effects::Effect& effect = *contender.effect;
+bool Contest::improve_each_other(const SampleCandidate& a, const SampleCandidate& b) const {
+    const auto kind = [](const SampleCandidate& finalist) {
+        const effects::Effect& effect = *finalist.effect;
         return is_slow_rate(effect) ? 0 : is_line(effect) ? 1 : 2;
     };
     if (kind(a) == kind(b)) return false;
@@ -407,24 +410,26 @@ void Contest::tie(const CandidateSet& best, const std::vector<CandidateSet>& as_
 /// Removes candidates that cannot be the answer: those that are not in the library, and resampling where a variance
 /// that oscillates explains more.
 /// \return the most likely candidate that is not in the library, or null
-Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const {
+Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<CompetingTest>& against) const {
     Shared unnamed;
-    std::erase_if(all, [&](const Shared& contender) {
-        if (contender->nameless && !unnamed) unnamed = contender;
-        return contender->nameless;
+    std::erase_if(all, [&](const Shared& finalist) {
+        if (finalist->placeholder && !unnamed) unnamed = finalist;
+        return finalist->placeholder;
     });
     // A variance that oscillates otherwise than on straight lines is no resampling.
     if (all.empty() || !shows(*all.front(), OnSamples::transport)) return unnamed;
-    std::vector<Rival> repeats = against;
-    std::erase_if(repeats, [](const Rival& rival) { return !rival.repeats; });
-    if (all.front()->merit > bar({{all.front()}, all.front()->merit, 0.0}, repeats, series_.size())) return unnamed;
-    std::erase_if(all, [](const Shared& contender) { return shows(*contender, OnSamples::transport); });
+    std::vector<CompetingTest> repeats = against;
+    std::erase_if(repeats, [](const CompetingTest& competing) { return !competing.repeats; });
+    if (all.front()->evidence >
+        evidence_to_exceed({{all.front()}, all.front()->evidence, 0.0}, repeats, series_.size()))
+        return unnamed;
+    std::erase_if(all, [](const Shared& finalist) { return shows(*finalist, OnSamples::transport); });
     return unnamed;
 }
 
 /// The effect to be used as a placeholder where nothing can be chosen: the closest to an unknown rate or line, or null.
 Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& unnamed) {
-    if (all.empty() || (unnamed && unnamed->merit > all.front()->merit)) return unnamed;
+    if (all.empty() || (unnamed && unnamed->evidence > all.front()->evidence)) return unnamed;
     const effects::Effect& leader = *all.front()->effect;
     if (is_line(leader)) return all.front();
     if (!is_slow_rate(leader)) return unnamed;
@@ -439,7 +444,7 @@ Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& u
 void Contest::tie_sources(SampleChoice& choice) const {
     const SampleModel& chosen = choice.chosen->fit->model();
     const double from_hz = chosen.noise.from_hz;
-    const double told_up_to_hz = options.samples.contest.told_up_to * series_.rate_hz;
+    const double distinguished_up_to_hz = options.samples.contest.distinguished_up_to * series_.rate_hz;
     for (const SamePattern& pattern : with_same_pattern(from_hz, series_.rate_hz)) {
         if (same_source(pattern.hz, from_hz, series_.rate_hz)) continue;
         check_interrupt();
@@ -448,7 +453,7 @@ void Contest::tie_sources(SampleChoice& choice) const {
         noise.from_phase = phase_of(pattern, chosen.noise.from_phase);
         const SampleFit other(series_, resampled_with(*now_.fit, noise), choice.chosen->fit->rows(),
                               SampleFit::Noise::free);
-        const bool beyond = from_hz > told_up_to_hz && pattern.hz > told_up_to_hz;
+        const bool beyond = from_hz > distinguished_up_to_hz && pattern.hz > distinguished_up_to_hz;
         if (beyond || choice.chosen->fit->gain_over(other) < options.tie) choice.other_hz.push_back(pattern.hz);
     }
     std::sort(choice.other_hz.begin(), choice.other_hz.end());
@@ -456,29 +461,33 @@ void Contest::tie_sources(SampleChoice& choice) const {
 
 SampleChoice Contest::choose() {
     const auto candidates = screened(now_, Wanted::all);
-    auto all = contenders(now_, candidates);
-    std::vector<Rival> against;
+    auto all = finalists(now_, candidates);
+    std::vector<CompetingTest> against;
     const auto may_be_of = [&](OnSamples as) {
         return std::any_of(all.begin(), all.end(), [as](const Shared& c) { return shows(*c, as); });
     };
     if (!all.empty()) {
-        against = rivals_of(*now_.fit, lattice_arcsec_, may_be_of(OnSamples::transport), may_be_of(OnSamples::motion));
+        against = competing_tests_of(*now_.fit, lattice_arcsec_, may_be_of(OnSamples::transport),
+                                     may_be_of(OnSamples::motion));
     }
-    const auto holds = [&](const CandidateSet& set) { return set.merit > bar(set, against, series_.size()); };
+    const auto holds = [&](const CandidateSet& set) {
+        return set.evidence > evidence_to_exceed(set, against, series_.size());
+    };
     const Shared unnamed = set_aside(all, against);
     std::vector<CandidateSet> candidate_sets;
-    for (const Shared& contender : all) {
-        candidate_sets.push_back({{contender}, contender->merit, contender->p_value});
+    for (const Shared& finalist : all) {
+        candidate_sets.push_back({{finalist}, finalist->evidence, finalist->p_value});
     }
     const bool led = !all.empty() && holds(candidate_sets.front());
-    const double leader = all.empty() ? 0.0 : candidate_sets.front().merit;
+    const double leader = all.empty() ? 0.0 : candidate_sets.front().evidence;
     const bool random_leads = !all.empty() && candidate_sets.front().random();
     if (!led || is_slow_rate(*all.front()->effect)) {
         for (CandidateSet& set : sets(all, candidates)) candidate_sets.push_back(std::move(set));
-        if (all.empty() && !candidate_sets.empty()) against = rivals_of(*now_.fit, lattice_arcsec_, false, false);
+        if (all.empty() && !candidate_sets.empty())
+            against = competing_tests_of(*now_.fit, lattice_arcsec_, false, false);
     }
     std::stable_sort(candidate_sets.begin(), candidate_sets.end(),
-                     [](const CandidateSet& a, const CandidateSet& b) { return a.merit > b.merit; });
+                     [](const CandidateSet& a, const CandidateSet& b) { return a.evidence > b.evidence; });
     // Where a residual test explains more than the most likely effect, another effect must be as likely and explain
     // more than every test by far, and a set must be far better than that effect.
     const auto may_be = [&](const CandidateSet& set) {
@@ -486,16 +495,17 @@ SampleChoice Contest::choose() {
         if (set.members.size() > 1) {
             // A random rate that does not exceed the residual tests comes near to any structure.
             const double more = random_leads && !set.random() ? 0.0 : options.tie;
-            return set.merit > leader + more && holds(set);
+            return set.evidence > leader + more && holds(set);
         }
-        return set.merit > std::max(leader - options.tie, bar(set, against, series_.size()) + options.tie);
+        return set.evidence >
+               std::max(leader - options.tie, evidence_to_exceed(set, against, series_.size()) + options.tie);
     };
     // The smallest number of effects that explains as much as any.
     const CandidateSet* best = nullptr;
     double least = 0.0;
     for (const CandidateSet& set : candidate_sets) {
-        if (!(set.merit > least) || !may_be(set)) continue;
-        if (best == nullptr) least = std::max(least, set.merit - options.tie);
+        if (!(set.evidence > least) || !may_be(set)) continue;
+        if (best == nullptr) least = std::max(least, set.evidence - options.tie);
         if (best == nullptr || set.members.size() < best->members.size()) best = &set;
     }
     if (best == nullptr) {
@@ -504,11 +514,11 @@ SampleChoice Contest::choose() {
         return none;
     }
     const bool slow = best->members.size() == 1 && !best->random() && is_slow_rate(*best->members.front()->effect);
-    const double least_random = slow ? std::max(0.0, best->merit - options.tie_with_random) : least;
+    const double least_random = slow ? std::max(0.0, best->evidence - options.tie_with_random) : least;
     std::vector<CandidateSet> as_likely;
     for (const CandidateSet& set : candidate_sets) {
-        const bool tied_random = set.members.size() == 1 && set.random() && set.merit > least_random;
-        if (set.merit > least || tied_random) as_likely.push_back(set);
+        const bool tied_random = set.members.size() == 1 && set.random() && set.evidence > least_random;
+        if (set.evidence > least || tied_random) as_likely.push_back(set);
     }
     if (slow) add_weak_random(candidates, all, least_random, as_likely);
     SampleChoice choice;
@@ -529,7 +539,7 @@ SampleChoice Contest::choose() {
     }
     if (best->members.size() > 1) choice.chosen = placed(choice.chosen, best->members.back()->fit->model());
     std::erase_if(as_likely, [&](const CandidateSet& set) {
-        return set.members.size() == 1 && beside_each_other(*choice.chosen, *set.members.front());
+        return set.members.size() == 1 && improve_each_other(*choice.chosen, *set.members.front());
     });
     tie(*best, as_likely, choice);
     if (is_random_rate(*choice.chosen->effect)) {

@@ -33,7 +33,7 @@ double line_hz(const SampleModel& model, int step) {
     const auto of_step = [step](const SampleColumn& c) { return c.step == step && c.name == "cosine"; };
     const auto found = std::find_if(model.columns.begin(), model.columns.end(), of_step);
     if (found == model.columns.end()) throw RunError("a line that was added is not in the model");
-    return found->course.hz;
+    return found->track.hz;
 }
 
 }  // namespace
@@ -212,7 +212,7 @@ std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, 
         const auto of_step = [&](const SampleColumn& c) { return c.step == of.id; };
         const auto cosine = std::find_if(model.columns.begin(), model.columns.end(), of_step);
         if (cosine == model.columns.end()) return std::nullopt;
-        without.parameters = 2 + static_cast<int>(cosine->course.free);
+        without.parameters = 2 + static_cast<int>(cosine->track.free);
         std::erase_if(model.columns, of_step);
     } else {
         return std::nullopt;

@@ -34,50 +34,53 @@ ResidualTest test_of(const Disturbed& disturbed) {
 /// Tests the residual. If any test passes the level, the reported structure is that of the regression that explains
 /// most with the noise fitted again; if no regression explains anything, that of the test with the smallest p-value.
 void SampleLoop::test_what_is_left(Closure& closure) const {
-    const std::size_t looked_at = options.samples.loop.most_views;
-    auto views = view_samples(*now_.fit, lattice_step());
-    views.push_back({test_of(find_disturbed(*now_.fit, whole_))});
-    if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
-    const auto count = static_cast<double>(views.size());
-    const auto may_be_chance = [count](const SampleView& view) {
-        return of_several(view.test.p_value, count) >= options.level_of_residual;
+    const std::size_t looked_at = options.samples.loop.most_tests;
+    auto tests = test_residual(*now_.fit, lattice_step());
+    tests.push_back({test_of(find_disturbed(*now_.fit, whole_))});
+    if (rounded_.drawn()) tests.push_back({rounded_.test(*now_.fit)});
+    const auto count = static_cast<double>(tests.size());
+    const auto may_be_chance = [count](const SampleResidualTest& test) {
+        return of_several(test.result.p_value, count) >= options.level_of_residual;
     };
-    if (!std::all_of(views.begin(), views.end(), may_be_chance)) {
-        correct_for_counts(*now_.fit, lattice_step(), views);
+    if (!std::all_of(tests.begin(), tests.end(), may_be_chance)) {
+        correct_for_counts(*now_.fit, lattice_step(), tests);
     }
     closure.tests.clear();
-    for (const SampleView& view : views) closure.tests.push_back(view.test);
+    for (const SampleResidualTest& test : tests) closure.tests.push_back(test.result);
     closure.unexplained.reset();
-    std::erase_if(views, may_be_chance);
-    if (views.empty()) return;
-    std::sort(views.begin(), views.end(),
-              [](const SampleView& a, const SampleView& b) { return a.test.p_value < b.test.p_value; });
-    closure.unexplained = views.front().test;
-    std::sort(views.begin(), views.end(),
-              [](const SampleView& a, const SampleView& b) { return a.test.merit > b.test.merit; });
-    if (views.size() > looked_at) views.resize(looked_at);
+    std::erase_if(tests, may_be_chance);
+    if (tests.empty()) return;
+    std::sort(tests.begin(), tests.end(), [](const SampleResidualTest& a, const SampleResidualTest& b) {
+        return a.result.p_value < b.result.p_value;
+    });
+    closure.unexplained = tests.front().result;
+    std::sort(tests.begin(), tests.end(), [](const SampleResidualTest& a, const SampleResidualTest& b) {
+        return a.result.evidence > b.result.evidence;
+    });
+    if (tests.size() > looked_at) tests.resize(looked_at);
     double most = 0.0;
-    const SampleView* regression = nullptr;
-    for (const SampleView& view : views) {
-        if (!view.columns) continue;
-        const double merit = refitted_merit(*now_.fit, view);
-        if (merit <= most) continue;
-        most = merit;
-        regression = &view;
-        closure.unexplained = view.test;
+    const SampleResidualTest* regression = nullptr;
+    for (const SampleResidualTest& test : tests) {
+        if (!test.columns) continue;
+        const double evidence = refitted_evidence(*now_.fit, test);
+        if (evidence <= most) continue;
+        most = evidence;
+        regression = &test;
+        closure.unexplained = test.result;
     }
     // A strong rate looks like lines: those count only if they remain when the rate is fitted.
-    std::vector<SampleView> beside;
-    if (regression != nullptr) beside = view_samples(fit_beside(*now_.fit, *regression), lattice_step());
-    for (const SampleView& view : views) {
-        if (view.columns || !(view.test.merit > most)) continue;
-        const bool stays = beside.empty() || std::any_of(beside.begin(), beside.end(), [&](const SampleView& other) {
-                               return other.test.view == view.test.view &&
-                                      of_several(other.test.p_value, count) < options.level_of_residual;
-                           });
+    std::vector<SampleResidualTest> repeated;
+    if (regression != nullptr) repeated = test_residual(fit_with_columns(*now_.fit, *regression), lattice_step());
+    for (const SampleResidualTest& test : tests) {
+        if (test.columns || !(test.result.evidence > most)) continue;
+        const bool stays =
+            repeated.empty() || std::any_of(repeated.begin(), repeated.end(), [&](const SampleResidualTest& other) {
+                return other.result.subject == test.result.subject &&
+                       of_several(other.result.p_value, count) < options.level_of_residual;
+            });
         if (!stays) continue;
-        most = view.test.merit;
-        closure.unexplained = view.test;
+        most = test.result.evidence;
+        closure.unexplained = test.result;
     }
 }
 
@@ -86,8 +89,8 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
 void SampleLoop::test_left_out(Closure& closure) const {
     if (std::find(disturbed_.rows.begin(), disturbed_.rows.end(), 1) == disturbed_.rows.end()) return;
     const ResidualTest test = test_of(still_disturbed());
-    const auto same =
-        std::find_if(closure.tests.begin(), closure.tests.end(), [&](const auto& t) { return t.view == test.view; });
+    const auto same = std::find_if(closure.tests.begin(), closure.tests.end(),
+                                   [&](const auto& t) { return t.subject == test.subject; });
     if (same != closure.tests.end() && same->p_value < test.p_value) return;
     if (same == closure.tests.end()) {
         closure.tests.push_back(test);
@@ -127,7 +130,7 @@ void SampleLoop::go_without_random(Closure& closure) {
 
 /// The residual contains a rate or a line that no effect of the library explains. The closest effect is added as a
 /// placeholder, so that other effects can still be found.
-void SampleLoop::look_beside_nearest(Closure& closure) {
+void SampleLoop::look_behind_placeholder(Closure& closure) {
     const int most = options.samples.loop.most_placeholders;
     const State without = now_;
     const int first = next_id_;
@@ -142,14 +145,14 @@ void SampleLoop::look_beside_nearest(Closure& closure) {
         around_hz.push_back(now_.added.back().hz);
         add_all(closure, line);
     }
-    const bool of_witness = left && left->view == followed_witnesses;
+    const bool of_witness = left && left->subject == followed_witnesses;
     // Lines near a placeholder are its residual of the unknown line; a rate may be part of the unknown rate; and a
     // motion may be part of a rate that follows an acceleration.
     const auto keeps = [&](const AddedEffect& added) {
         if (!line) return !is_slow_rate(added.effect()) && !(of_witness && is_motion(added.step.effect));
         if (!is_line(added.effect())) return !is_random_rate(added.effect());
         return std::none_of(around_hz.begin(), around_hz.end(),
-                            [&](double hz) { return std::abs(hz - added.hz) < options.samples.lines.beside_hz; });
+                            [&](double hz) { return std::abs(hz - added.hz) < options.samples.lines.adjacent_hz; });
     };
     if (!keep_names(first, keeps, closure)) begin_again(without);
     closure.unexplained = left;
@@ -182,12 +185,12 @@ void SampleLoop::take_back_lines(Closure& closure) {
     const double little = options.samples.loop.unsteady_line;
     const bool fails = line.off > little &&
                        of_several(line.p_value, static_cast<double>(closure.tests.size())) < options.level_of_residual;
-    const bool beside = line.beside > little;
-    if (!fails && !beside) return;
+    const bool adjacent = line.adjacent > little;
+    if (!fails && !adjacent) return;
     for (std::size_t k = 0; k < now_.added.size(); ++k) {
         if (now_.added[k].id != line.step) continue;
         const std::string at = fmt::format("at {:.6g} Hz", line.hz);
-        closure.unexplained = ResidualTest{beside ? Where::frequency : Where::amplitude,
+        closure.unexplained = ResidualTest{adjacent ? Where::frequency : Where::amplitude,
                                            "a line that does not keep its amplitude or its frequency",
                                            fails ? line.p_value : closure.unexplained->p_value, at};
         closure.notes.push_back(fmt::format(

@@ -95,7 +95,7 @@ class SampleLoop {
     void add_all(Closure& closure, bool random_rates);
     void begin_again(const State& at);
     void go_without_random(Closure& closure);
-    void look_beside_nearest(Closure& closure);
+    void look_behind_placeholder(Closure& closure);
     bool keep_names(int first_id, const std::function<bool(const AddedEffect&)>& keeps, Closure& closure);
     Disturbed still_disturbed() const;
     bool restore();

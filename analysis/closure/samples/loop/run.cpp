@@ -344,7 +344,7 @@ Closure SampleLoop::run() {
     if (closure.unexplained && earlier_) {
         go_without_random(closure);
     } else if (closure.unexplained && nearest_) {
-        look_beside_nearest(closure);
+        look_behind_placeholder(closure);
     }
     take_back_lines(closure);
     test_left_out(closure);

@@ -56,7 +56,7 @@ SampleFilter::Many::Many(const SampleFilter& filter, std::span<const double> rea
     std::copy(readings.begin(), readings.end(), x_.begin());
 }
 
-void SampleFilter::Many::foretell(std::span<double> readings) {
+void SampleFilter::Many::predict(std::span<double> readings) {
     const std::size_t count = count_;
     std::fill(readings.begin(), readings.end(), 0.0);
     for (int i = 0; i < filter_.states_.count; ++i) {

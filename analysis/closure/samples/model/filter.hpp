@@ -34,7 +34,7 @@ class SampleFilter {
         /// Each filter starts at one of these readings [arcsec].
         Many(const SampleFilter& filter, std::span<const double> readings);
         /// Advances all filters by one row and writes the readings that they predict.
-        void foretell(std::span<double> readings);
+        void predict(std::span<double> readings);
         /// Updates the states of all filters with the innovations of this row, one per filter.
         void take(std::size_t row, std::span<const double> innovations);
         /// Replaces the states of each filter by those of the filter with the given index.

@@ -273,10 +273,10 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
     const double highest = 0.5 / step;
     if (!(lowest < highest)) return lattice;
     const double du = 0.02 / sigma;
-    const auto places = static_cast<std::size_t>((highest - lowest) / du) + 1;
+    const auto positions = static_cast<std::size_t>((highest - lowest) / du) + 1;
     double best = 0.0;
     double at = 0.0;
-    for (std::size_t k = 0; k < places; ++k) {
+    for (std::size_t k = 0; k < positions; ++k) {
         const double u = lowest + static_cast<double>(k) * du;
         const double c = characteristic(u);
         if (c > best) {
@@ -293,7 +293,7 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
             }
         }
     }
-    const double p = of_several(std::exp(-count * best * best), static_cast<double>(places));
+    const double p = of_several(std::exp(-count * best * best), static_cast<double>(positions));
     const auto& record = options.samples.record;
     if (best > record.coarser_lattice_strength && p < record.coarser_lattice_p && at < highest) {
         lattice.step_arcsec = 1.0 / at;

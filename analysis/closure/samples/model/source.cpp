@@ -137,8 +137,8 @@ std::vector<double> as_taken(const SampleSource& source, const std::vector<doubl
     return std::move(taken[0]);
 }
 
-std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const LineCourse& course) {
-    const auto phase = line_phase(size, rate_hz, course);
+std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const FrequencyTrack& track) {
+    const auto phase = line_phase(size, rate_hz, track);
     std::vector<std::vector<double>> columns(2, std::vector<double>(size));
     for (std::size_t i = 0; i < size; ++i) {
         columns[0][i] = std::cos(phase[i]);
@@ -148,13 +148,13 @@ std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, 
 }
 
 std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz,
-                                               const LineCourse& course) {
-    if (!(source.from_hz > 0.0)) return line_columns(size, rate_hz, course);
+                                               const FrequencyTrack& track) {
+    if (!(source.from_hz > 0.0)) return line_columns(size, rate_hz, track);
     // An angle of sin(phase)/(2 sin(pi f/rate)) has increments of cos(phase).
-    const double gain = 2.0 * std::sin(units::pi * course.hz / rate_hz);
+    const double gain = 2.0 * std::sin(units::pi * track.hz / rate_hz);
     auto taken = between_readings<2>(source, size, 1.0 / rate_hz, [&](double tick) {
         const double t = (tick - source.from_phase) / source.from_hz - 0.5 * static_cast<double>(size) / rate_hz;
-        const double turns = course.turns(t);
+        const double turns = track.turns(t);
         const double phase = units::two_pi * (turns - std::floor(turns));
         return std::array{std::sin(phase) / gain, -std::cos(phase) / gain};
     });

@@ -2,7 +2,7 @@
 #include <optional>
 #include <vector>
 
-#include "analysis/closure/samples/model/line_course.hpp"
+#include "analysis/closure/samples/model/frequency_track.hpp"
 
 /// Model of a resampled record: its source took readings of the angle at a rate of its own, and the record contains the
 /// straight lines between them.
@@ -41,11 +41,11 @@ std::vector<double> as_taken(const SampleSource& source, const std::vector<doubl
 
 /// Two columns of increments, cos and sin of the phase of a line, which is counted from the middle of the record to the
 /// middle of each interval.
-std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const LineCourse& course);
+std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const FrequencyTrack& track);
 /// The same columns in a resampled record. The frequency is that in the source's readings: up to half of the source's
 /// rate, which may be more than half of the record's, and not a multiple of the record's rate.
 std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz,
-                                               const LineCourse& course);
+                                               const FrequencyTrack& track);
 
 /// Frequency at which a line appears in samples, and whether it falls there if the frequency of the line rises.
 struct Alias {

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/residual/templates.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
-#include "analysis/closure/samples/residual/views.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
 namespace ringlock::closure {
@@ -57,16 +57,16 @@ LocalCubic local_cubic(const std::vector<double>& x, std::size_t half) {
 
 double duration_s(const SampleSeries& series) { return static_cast<double>(series.size()) * series.interval_s; }
 
-void test_columns(const SampleFit& fit, Where where, const char* view, Columns columns, Views& views) {
+void test_columns(const SampleFit& fit, Where where, const char* subject, Columns columns, SampleResidualTests& tests) {
     const auto score = fit.score(taken_by(fit, columns));
     if (score.rank == 0) return;
     const double cost = score.rank;
-    views.push_back({{where, view, chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+    tests.push_back({{where, subject, chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
                      cost,
                      [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
 }
 
-void test_temperature(const SampleFit& fit, Views& views) {
+void test_temperature(const SampleFit& fit, SampleResidualTests& tests) {
     const SampleSeries& series = fit.series();
     const auto& t = series.temperature_change_k;
     if (t.empty()) return;
@@ -74,7 +74,7 @@ void test_temperature(const SampleFit& fit, Views& views) {
     std::vector<double> square(n);
     for (std::size_t i = 0; i < n; ++i) square[i] = t[i] * t[i];
     test_columns(fit, Where::temperature, "rates that follow temperature, its square and its slope",
-                 {t, square, series.temperature_slope_k_per_s}, views);
+                 {t, square, series.temperature_slope_k_per_s}, tests);
     // A mass between thermometer and gyro, which may be warmer or colder at the start. Short lags equal the slope.
     const auto lag_s = [&series](std::size_t place) {
         return 0.5 * duration_s(series) * std::pow(1.6, -static_cast<double>(place));
@@ -88,11 +88,11 @@ void test_temperature(const SampleFit& fit, Views& views) {
         return {now, lagged(now, series.interval_s, lag_s(place)), std::move(start)};
     };
     const auto said = [lag_s](std::size_t place) { return fmt::format("by {:.2g} s", lag_s(place)); };
-    test_places(fit, Where::temperature, "rates that follow the temperature late",
-                {options.samples.residual.temperature_lags, columns, said, 1}, views);
+    test_templates(fit, Where::temperature, "rates that follow the temperature late",
+                   {options.samples.residual.temperature_lags, columns, said, 1}, tests);
 }
 
-void test_input(const SampleFit& fit, Views& views) {
+void test_input(const SampleFit& fit, SampleResidualTests& tests) {
     const SampleSeries& series = fit.series();
     const auto& x = series.input_rate_deg_h;
     if (x.empty()) return;
@@ -107,7 +107,7 @@ void test_input(const SampleFit& fit, Views& views) {
         cube[i] = one[i] * square[i];
     }
     test_columns(fit, Where::rate, "rates that follow the input rate, its square and its cube", {one, square, cube},
-                 views);
+                 tests);
     // The instrument that measures the input may be early or late by a little, and has noise of its own, which is
     // faster than the input.
     const auto half = [n](std::size_t place) {
@@ -122,12 +122,12 @@ void test_input(const SampleFit& fit, Views& views) {
     const auto said = [&series, half](std::size_t place) {
         return fmt::format("within {:.2g} s", static_cast<double>(half(place)) * series.interval_s);
     };
-    test_places(fit, Where::rate, "rates that follow the input rate's slope and its noise",
-                {options.samples.residual.input_reaches, columns, said}, views);
+    test_templates(fit, Where::rate, "rates that follow the input rate's slope and its noise",
+                   {options.samples.residual.input_reaches, columns, said}, tests);
 }
 
 /// A bias that is proportional to the acceleration. A lag smooths the witness as well, whose noise is fast.
-void test_accelerations(const SampleFit& fit, Views& views) {
+void test_accelerations(const SampleFit& fit, SampleResidualTests& tests) {
     const SampleSeries& series = fit.series();
     if (series.witnesses.empty()) return;
     const auto lag_s = [&series](std::size_t place) {
@@ -145,16 +145,16 @@ void test_accelerations(const SampleFit& fit, Views& views) {
     const auto said = [lag_s](std::size_t place) {
         return place == 0 ? std::string() : fmt::format("{:.2g} s late", lag_s(place));
     };
-    test_places(fit, Where::frequency, std::string(followed_witnesses),
-                {options.samples.residual.acceleration_lags, columns, said}, views);
+    test_templates(fit, Where::frequency, std::string(followed_witnesses),
+                   {options.samples.residual.acceleration_lags, columns, said}, tests);
 }
 
 }  // namespace
 
-void view_followed(const SampleFit& fit, Views& views) {
-    test_temperature(fit, views);
-    test_input(fit, views);
-    test_accelerations(fit, views);
+void test_followed(const SampleFit& fit, SampleResidualTests& tests) {
+    test_temperature(fit, tests);
+    test_input(fit, tests);
+    test_accelerations(fit, tests);
 }
 
 }  // namespace ringlock::closure

@@ -40,7 +40,7 @@ std::optional<RateBeat> find_rate_beat(const SampleFit& fit, const record::Decla
             const double fringes = (angle + 0.5 * series.increment[i]) / k_arcsec -
                                    steps_hz * series.interval_s * (static_cast<double>(i) + 0.5);
             angle += series.increment[i];
-            if (!fit.telling()[i]) continue;
+            if (!fit.informative()[i]) continue;
             const double turns = m * fringes;
             const auto wave = std::polar(1.0, -units::two_pi * (turns - std::floor(turns)));
             sum += fit.innovations()[i] * wave;

@@ -11,8 +11,8 @@
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
+#include "analysis/closure/samples/residual/templates.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
-#include "analysis/closure/samples/residual/views.hpp"
 #include "analysis/closure/stats/normality.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/two_levels.hpp"
@@ -25,7 +25,7 @@ namespace {
 
 /// Rates that are polynomials of time, of as few terms as the record requires (Schwarz, Annals of Statistics 6, 1978,
 /// 461).
-void test_powers_of_time(const SampleFit& fit, Views& views) {
+void test_powers_of_time(const SampleFit& fit, SampleResidualTests& tests) {
     const std::size_t degrees = options.samples.residual.polynomial_degrees;
     const std::size_t n = fit.series().size();
     Columns powers;
@@ -42,21 +42,21 @@ void test_powers_of_time(const SampleFit& fit, Views& views) {
         taken.push_back(fit.as_taken(rate));
         powers.push_back(std::move(rate));
         score = fit.score(taken);
-        const double merit = 0.5 * (score.chi2 - score.rank * std::log(static_cast<double>(n)));
-        if (degree > 0 && merit <= most) continue;
-        most = merit;
+        const double evidence = 0.5 * (score.chi2 - score.rank * std::log(static_cast<double>(n)));
+        if (degree > 0 && evidence <= most) continue;
+        most = evidence;
         degree = k;
     }
     if (score.rank == 0) return;
     powers.resize(degree);
-    views.push_back({{Where::time, "rates that are polynomials of time", chi2_tail(score.chi2, score.rank),
+    tests.push_back({{Where::time, "rates that are polynomials of time", chi2_tail(score.chi2, score.rank),
                       fmt::format("degree {}", degree), 0.5 * score.chi2 - score.rank},
                      static_cast<double>(degree) + std::log(static_cast<double>(degrees)),
                      [powers = std::make_shared<const Columns>(std::move(powers))] { return *powers; }});
 }
 
 /// A rate with an oscillation that is too slow for a line.
-void test_slow_swings(const SampleFit& fit, Views& views) {
+void test_slow_swings(const SampleFit& fit, SampleResidualTests& tests) {
     const std::size_t n = fit.series().size();
     const auto periods = [](std::size_t place) { return 0.25 * static_cast<double>(place + 1); };
     const auto swing = [n, periods](std::size_t place) {
@@ -71,12 +71,12 @@ void test_slow_swings(const SampleFit& fit, Views& views) {
     const auto said = [periods](std::size_t place) {
         return fmt::format("{:g} periods over the record", periods(place));
     };
-    test_places(fit, Where::time, "a rate that swings slowly", {options.samples.residual.slow_swings, swing, said},
-                views);
+    test_templates(fit, Where::time, "a rate that swings slowly", {options.samples.residual.slow_swings, swing, said},
+                   tests);
 }
 
 /// A rate that settles exponentially after the start.
-void test_settling(const SampleFit& fit, Views& views) {
+void test_settling(const SampleFit& fit, SampleResidualTests& tests) {
     const auto& time_s = fit.series().time_s;
     const double duration_s = time_s.back() - time_s.front();
     // A constant between two of these loses little with either.
@@ -93,33 +93,33 @@ void test_settling(const SampleFit& fit, Views& views) {
     const auto said = [constant_s](std::size_t place) {
         return fmt::format("with a time constant of {:.2g} s", constant_s(place));
     };
-    test_places(fit, Where::time, "a rate that settles", {options.samples.residual.settling_constants, settles, said},
-                views);
+    test_templates(fit, Where::time, "a rate that settles",
+                   {options.samples.residual.settling_constants, settles, said}, tests);
 }
 
-void test_steps(const SampleFit& fit, Views& views) {
+void test_steps(const SampleFit& fit, SampleResidualTests& tests) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
     std::vector<double> roots;
     double best = 0.0;
     std::size_t at = 0;
-    const std::size_t places = options.samples.residual.step_places;
+    const std::size_t positions = options.samples.residual.step_positions;
     const auto step_at = [n](std::size_t row) {
         std::vector<double> step(n, 0.0);
         std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), 1.0);
         return step;
     };
-    for (std::size_t k = 1; k < places; ++k) {
-        const auto score = fit.score({fit.as_taken(step_at(n * k / places))});
+    for (std::size_t k = 1; k < positions; ++k) {
+        const auto score = fit.score({fit.as_taken(step_at(n * k / positions))});
         const double root = score.rank > 0 ? std::copysign(std::sqrt(score.chi2), score.value[0]) : 0.0;
         roots.push_back(root);
         if (std::abs(root) > best) {
             best = std::abs(root);
-            at = n * k / places;
+            at = n * k / positions;
         }
     }
-    const double cost = 2.0 + std::log(davies_places(best * best, roots));
-    views.push_back({{Where::time, "steps of the rate", davies_bound(best * best, roots),
+    const double cost = 2.0 + std::log(davies_look_elsewhere(best * best, roots));
+    tests.push_back({{Where::time, "steps of the rate", davies_bound(best * best, roots),
                       fmt::format("at {:.6g} s", series.time_s[at]), 0.5 * best * best - cost},
                      cost,
                      [step_at, at] { return Columns{step_at(at)}; }});
@@ -145,7 +145,7 @@ std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& 
     };
     double best = fit.score({fit.as_taken(rate())}).chi2;
     const std::size_t length = std::max<std::size_t>(1, n / stretches);
-    for (std::size_t step = length / 2; step > length / options.samples.residual.jump_places; step /= 2) {
+    for (std::size_t step = length / 2; step > length / options.samples.residual.jump_positions; step /= 2) {
         for (std::size_t& jump : jumps) {
             for (const bool later : {false, true}) {
                 const std::size_t from = jump;
@@ -196,7 +196,7 @@ Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
         responses[s].from = n * s / stretches - std::min<std::size_t>(n * s / stretches, 4);
         double sum = 0.0;
         for (std::size_t i = responses[s].from; i < last; ++i) {
-            if (!fit.telling()[i]) column[i] = 0.0;
+            if (!fit.informative()[i]) column[i] = 0.0;
             responses[s].values.push_back(static_cast<float>(column[i]));
             sum += column[i] * fit.innovations()[i];
         }
@@ -226,7 +226,7 @@ Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
 
 /// Gain of the log-likelihood by a rate of two states, less the cost of its parameters; the noise is fitted again with
 /// it.
-double merit_of_states(const SampleFit& fit, const TwoStates& first) {
+double evidence_of_states(const SampleFit& fit, const TwoStates& first) {
     const std::size_t n = fit.series().size();
     const auto stretches = static_cast<std::size_t>(first.expected.size());
     std::vector<double> rate(n);
@@ -237,58 +237,58 @@ double merit_of_states(const SampleFit& fit, const TwoStates& first) {
     with.columns.push_back({nullptr, "view", std::make_shared<const std::vector<double>>(std::move(rate))});
     SampleModel without = fit.model();
     without.noise = SampleFit(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::near).model().noise;
-    const SampleFit beside(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);
+    const SampleFit without_rate(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);
     // Jumps may be within a stretch: stretches are divided while each is correlated with the adjacent ones only.
     constexpr double little = 1e-3;
     std::size_t finer = 4;
-    Stretches all = regress_on_stretches(beside, finer * stretches);
+    Stretches all = regress_on_stretches(without_rate, finer * stretches);
     while (finer > 1 && all.normal.diagonal(2).cwiseAbs().maxCoeff() > little * all.normal.diagonal().maxCoeff()) {
         finer /= 2;
-        all = regress_on_stretches(beside, finer * stretches);
+        all = regress_on_stretches(without_rate, finer * stretches);
     }
     Eigen::VectorXd shape(all.right.size());
     for (Eigen::Index k = 0; k < shape.size(); ++k) {
         shape(k) = (first.expected(k / static_cast<Eigen::Index>(finer)) - first.rate) / first.step;
     }
-    return beside.gain_over(fit) + two_states(all.normal, all.right, shape).gain -
+    return without_rate.gain_over(fit) + two_states(all.normal, all.right, shape).gain -
            options.samples.residual.price_of_states;
 }
 
 /// Rates of stretches of the record, for a rate that jumps between two levels.
-void test_levels(const SampleFit& fit, Views& views) {
+void test_levels(const SampleFit& fit, SampleResidualTests& tests) {
     const std::size_t stretches = options.samples.residual.level_stretches;
     const Stretches all = regress_on_stretches(fit, stretches);
     const TwoLevels found = two_levels(all.normal - all.of_columns, all.right);
     // Jumps may be within a stretch.
     const double cost = found.cost + options.samples.residual.price_of_jump * found.changes;
-    SampleView view{
-        {Where::time, std::string(jumping_rate), found.p_value, fmt::format("{} jumps", found.changes), found.merit},
+    SampleResidualTest test{
+        {Where::time, std::string(jumping_rate), found.p_value, fmt::format("{} jumps", found.changes), found.evidence},
         cost,
         [&fit, found] { return Columns{two_level_rate(fit, found.shape)}; }};
-    view.jumps = found.changes > 1;  // a single jump is the step of the library
+    test.jumps = found.changes > 1;  // a single jump is the step of the library
     // With a random rate in the model, stretches are not independent.
-    if (view.jumps && !fit.model().walk && !fit.model().flicker) {
+    if (test.jumps && !fit.model().walk && !fit.model().flicker) {
         const TwoStates states = two_states(all.normal, all.right, found.shape);
-        if (states.step != 0.0) view.refitted = [&fit, states](double) { return merit_of_states(fit, states); };
+        if (states.step != 0.0) test.refitted = [&fit, states](double) { return evidence_of_states(fit, states); };
     }
-    views.push_back(std::move(view));
+    tests.push_back(std::move(test));
 }
 
-void test_jumps(const SampleFit& fit, Views& views) {
-    if (const auto jump = jump_beside_random(fit)) {
-        views.emplace_back().test = test_of(*jump);
+void test_jumps(const SampleFit& fit, SampleResidualTests& tests) {
+    if (const auto jump = jump_with_random_rate(fit)) {
+        tests.emplace_back().result = test_of(*jump);
     }
 }
 
 }  // namespace
 
-void view_rates(const SampleFit& fit, Views& views) {
-    test_steps(fit, views);
-    test_powers_of_time(fit, views);
-    test_slow_swings(fit, views);
-    test_settling(fit, views);
-    test_levels(fit, views);
-    test_jumps(fit, views);
+void test_rate_patterns(const SampleFit& fit, SampleResidualTests& tests) {
+    test_steps(fit, tests);
+    test_powers_of_time(fit, tests);
+    test_slow_swings(fit, tests);
+    test_settling(fit, tests);
+    test_levels(fit, tests);
+    test_jumps(fit, tests);
 }
 
 }  // namespace ringlock::closure

@@ -127,7 +127,7 @@ std::vector<double> simulated_noise(const SampleFit& fit, random::NormalStream& 
 }
 
 /// Residual tests of a record that is simulated by the model.
-Views simulated_views(const SampleFit& fit, double lattice_arcsec, std::uint64_t number) {
+SampleResidualTests simulated_tests(const SampleFit& fit, double lattice_arcsec, std::uint64_t number) {
     constexpr std::uint64_t seed = 0;
     random::NormalStream normal({seed, number}, random::Purpose::bootstrap);
     SampleSeries series = fit.series();
@@ -135,25 +135,25 @@ Views simulated_views(const SampleFit& fit, double lattice_arcsec, std::uint64_t
     const std::vector<double> known = fit.determined();
     for (std::size_t i = 0; i < known.size(); ++i) series.increment[i] += known[i];
     const SampleFit simulated(series, fit.model(), fit.rows(), SampleFit::Noise::held);
-    return view_samples(simulated, lattice_arcsec);
+    return test_residual(simulated, lattice_arcsec);
 }
 
 }  // namespace
 
-void correct_for_counts(const SampleFit& fit, double lattice_arcsec, Views& views) {
+void correct_for_counts(const SampleFit& fit, double lattice_arcsec, SampleResidualTests& tests) {
     if (fit.model().noise.count_error.harmonics == 0) return;
     const int records = options.samples.count_error.simulated_records;
     std::map<std::string, double> mean;  // of -log(p)
     for (int k = 0; k < records; ++k) {
         check_interrupt();
-        for (const SampleView& view : simulated_views(fit, lattice_arcsec, static_cast<std::uint64_t>(k))) {
-            mean[view.test.view] -= std::log(std::max(view.test.p_value, 1e-300)) / records;
+        for (const SampleResidualTest& test : simulated_tests(fit, lattice_arcsec, static_cast<std::uint64_t>(k))) {
+            mean[test.result.subject] -= std::log(std::max(test.result.p_value, 1e-300)) / records;
         }
     }
-    for (SampleView& view : views) {
-        const auto found = mean.find(view.test.view);
+    for (SampleResidualTest& test : tests) {
+        const auto found = mean.find(test.result.subject);
         if (found == mean.end() || found->second <= 1.0) continue;
-        view.test.p_value = std::pow(view.test.p_value, 1.0 / found->second);
+        test.result.p_value = std::pow(test.result.p_value, 1.0 / found->second);
     }
 }
 

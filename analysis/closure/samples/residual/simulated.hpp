@@ -1,5 +1,5 @@
 #pragma once
-#include "analysis/closure/samples/residual/views.hpp"
+#include "analysis/closure/samples/residual/templates.hpp"
 
 namespace ringlock::closure {
 
@@ -10,6 +10,6 @@ namespace ringlock::closure {
 /// bootstrap: Davison and Hinkley, "Bootstrap Methods and their Application", 1997, section 4.2). Under the null
 /// hypothesis -log(p) has the mean 1; where the simulated records give a larger one, p is raised to the power of its
 /// inverse.
-void correct_for_counts(const SampleFit& fit, double lattice_arcsec, Views& views);
+void correct_for_counts(const SampleFit& fit, double lattice_arcsec, SampleResidualTests& tests);
 
 }  // namespace ringlock::closure

@@ -10,8 +10,8 @@
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
 #include "analysis/closure/samples/fit/swing.hpp"
+#include "analysis/closure/samples/residual/templates.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
-#include "analysis/closure/samples/residual/views.hpp"
 #include "analysis/closure/stats/normality.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/whiteness.hpp"
@@ -20,12 +20,12 @@ namespace ringlock::closure {
 
 namespace {
 
-void test_size(const SampleFit& fit, Views& views) {
+void test_size(const SampleFit& fit, SampleResidualTests& tests) {
     const auto& e = fit.innovations();
-    const Rows& rows = fit.telling();
+    const Rows& rows = fit.informative();
     const std::size_t n = e.size();
     const auto [mean, variance] = squares_of(e, rows);
-    views.push_back({size_over_time(e, rows, 40, 20.0)});
+    tests.push_back({size_over_time(e, rows, 40, 20.0)});
     // Patterns of the place in the record: mean and mean square for each remainder.
     double least = 1.0;
     std::size_t at = 0;
@@ -53,29 +53,29 @@ void test_size(const SampleFit& fit, Views& views) {
             at = m;
         }
     }
-    views.push_back({{Where::time, fmt::format("place in the record modulo 2 to {}", most_modulo),
+    tests.push_back({{Where::time, fmt::format("place in the record modulo 2 to {}", most_modulo),
                       of_several(least, 2.0 * static_cast<double>(most_modulo - 1)), fmt::format("modulo {}", at)}});
     const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
-    const double cost = 2.0 + std::log(cycle.searched);
+    const double cost = 2.0 + std::log(cycle.look_elsewhere);
     const Swing swing = swing_of_variance(fit, cycle.frequency_hz);
-    SampleView view{{Where::time, std::string(repeating_variance), cycle.p_value,
-                     fmt::format("{:.6g} times a second", cycle.frequency_hz), swing.gain - cost}};
-    view.refitted = [&fit, hz = cycle.frequency_hz, swing, cost](double) {
+    SampleResidualTest test{{Where::time, std::string(repeating_variance), cycle.p_value,
+                             fmt::format("{:.6g} times a second", cycle.frequency_hz), swing.gain - cost}};
+    test.refitted = [&fit, hz = cycle.frequency_hz, swing, cost](double) {
         return with_swinging_errors(fit, hz, swing).gain_over(fit) - cost;
     };
-    views.push_back(std::move(view));
+    tests.push_back(std::move(test));
 }
 
-void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views) {
+void test_distribution(const SampleFit& fit, double lattice_arcsec, SampleResidualTests& tests) {
     const auto& e = fit.innovations();
     // Large steps are not normal noise; sums of them are nearly normal.
     const bool steps = lattice_arcsec > options.samples.residual.coarse_lattice * fit.typical_sd();
     // Between two readings of a whole cycle there are two kicks, whose distribution is flatter than a normal one; sums
     // of many are nearly normal.
     const std::size_t bounded = fit.series().whole_cycles ? 16 : 1;
-    if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1, bounded,
+    if (const auto test = fourth_moments(e, fit.informative(), steps ? 16 : 1, bounded,
                                          [&](std::size_t length) { return expected_excess(fit, length); })) {
-        views.push_back({*test});
+        tests.push_back({*test});
     }
     if (lattice_arcsec == 0.0 && !fit.series().cycle_counts) {
         // Values with so many digits are not equal by chance, least of all the largest.
@@ -91,7 +91,7 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views
             ties += x[i] > high - tolerance || x[i] < low + tolerance ? 1 : 0;
         }
         if (ties > options.samples.residual.most_ties) {
-            views.push_back(
+            tests.push_back(
                 {{Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)}});
         }
     }
@@ -99,20 +99,20 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views
 
 }  // namespace
 
-void view_sizes(const SampleFit& fit, double lattice_arcsec, Views& views) {
-    test_size(fit, views);
-    test_distribution(fit, lattice_arcsec, views);
+void test_sizes(const SampleFit& fit, double lattice_arcsec, SampleResidualTests& tests) {
+    test_size(fit, tests);
+    test_distribution(fit, lattice_arcsec, tests);
 }
 
 Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
     // Length by the informative rows, which are few in a record with many samples to every reading of its source.
-    std::size_t telling = 0;
-    for (std::size_t i = 0; i < n; ++i) telling += rows[i] && !fit.settled(i) ? 1 : 0;
+    std::size_t informative = 0;
+    for (std::size_t i = 0; i < n; ++i) informative += rows[i] && !fit.deterministic(i) ? 1 : 0;
     const SampleResidualOptions& by = options.samples.residual;
     const std::size_t length =
-        std::min(n, std::max(by.disturbed_rows * n / std::max<std::size_t>(telling, 1), n / by.disturbed_parts));
+        std::min(n, std::max(by.disturbed_rows * n / std::max<std::size_t>(informative, 1), n / by.disturbed_parts));
     const std::size_t windows = n / length;
     std::vector<double> power(windows, 0.0);
     std::vector<double> freedom(windows, 0.0);
@@ -122,7 +122,7 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
         double squares = 0.0;
         double count = 0.0;
         for (std::size_t i = w * length; i < (w + 1) * length; ++i) {
-            if (!rows[i] || fit.settled(i)) continue;
+            if (!rows[i] || fit.deterministic(i)) continue;
             sum += e[i];
             squares += e[i] * e[i];
             count += 1.0;

@@ -12,7 +12,7 @@
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
-#include "analysis/closure/samples/residual/views.hpp"
+#include "analysis/closure/samples/residual/templates.hpp"
 #include "analysis/closure/stats/normality.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/two_levels.hpp"
@@ -22,17 +22,17 @@ namespace ringlock::closure {
 
 namespace {
 
-void test_correlation(const SampleFit& fit, Views& views) {
-    views.push_back({correlations_of(fit.innovations(), fit.telling())
+void test_correlation(const SampleFit& fit, SampleResidualTests& tests) {
+    tests.push_back({correlations_of(fit.innovations(), fit.informative())
                          .test(Where::time, "correlation with the 24 samples before")});
 }
 
-void test_spectrum(const SampleFit& fit, Views& views) {
+void test_spectrum(const SampleFit& fit, SampleResidualTests& tests) {
     const std::size_t n = fit.innovations().size();
     std::vector<double> e(n, 0.0);
     double count = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
-        if (!fit.telling()[i]) continue;
+        if (!fit.informative()[i]) continue;
         e[i] = fit.innovations()[i];
         count += 1.0;
     }
@@ -72,31 +72,33 @@ void test_spectrum(const SampleFit& fit, Views& views) {
             worst_hz = 0.5 * static_cast<double>(a + b) * fit.series().rate_hz / static_cast<double>(padded);
         }
     }
-    views.push_back({{Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
+    tests.push_back({{Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
                       fmt::format("most at {:.4g} Hz, {:.3g} times the mean", worst_hz, worst_ratio)}});
     const FoundLines lines = find_lines(e, fit.series().rate_hz);
     const FoundLine line = lines.likeliest();
-    const double cost = 3.0 + std::log(line.searched);
+    const double cost = 3.0 + std::log(line.look_elsewhere);
     // A scattered line explains as much as a model that follows it from stretch to stretch.
     const double gain = 0.5 * std::max(line.chi2, lines.scattered);
     double p = line.p_value;
     bool coherent = line.chi2 >= lines.scattered;
     if (p < options.samples.residual.line_p) {
-        const LineCourse shown = line.drift_hz_per_s != 0.0 ? LineCourse::even(line.frequency_hz, line.drift_hz_per_s)
-                                                            : LineCourse::still(line.frequency_hz);
+        const FrequencyTrack shown = line.drift_hz_per_s != 0.0
+                                         ? FrequencyTrack::even(line.frequency_hz, line.drift_hz_per_s)
+                                         : FrequencyTrack::still(line.frequency_hz);
         const SampleLine refined = refine_line(fit, shown);
         coherent = !scatters(fit, e, lines, refined);
         // The level about a line is itself random, so that the p-value of the regression counts as well.
-        if (coherent) p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
+        if (coherent) p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.look_elsewhere));
     }
-    SampleView view{{Where::frequency, "lines, still and drifting", p,
-                     fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : lines.scattered_hz), gain - cost},
-                    cost};
-    view.hz = coherent ? line.frequency_hz : lines.scattered_hz;
+    SampleResidualTest test{
+        {Where::frequency, "lines, still and drifting", p,
+         fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : lines.scattered_hz), gain - cost},
+        cost};
+    test.hz = coherent ? line.frequency_hz : lines.scattered_hz;
     if (coherent) {
-        view.columns = [&fit, line] {
+        test.columns = [&fit, line] {
             const Alias of = of_source(line.frequency_hz, fit.series().rate_hz, fit.model().noise.from_hz).front();
-            return fit.line(LineCourse::even(line.frequency_hz, line.drift_hz_per_s).shown_at(of.hz, of.folded));
+            return fit.line(FrequencyTrack::even(line.frequency_hz, line.drift_hz_per_s).shown_at(of.hz, of.folded));
         };
     }
     if (!coherent) {
@@ -105,13 +107,13 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         const double squares = std::inner_product(e.begin(), e.end(), e.begin(), 0.0);
         const auto rows = static_cast<double>(std::count_if(e.begin(), e.end(), [](double x) { return x != 0.0; }));
         const double share = std::min(lines.scattered_squares / std::max(squares, 1e-300), 1.0 - 1e-9);
-        view.by_variance = std::min(gain, -0.5 * rows * std::log1p(-share)) - cost;
-        view.refitted = [&fit, lines, cost](double) {
+        test.by_variance = std::min(gain, -0.5 * rows * std::log1p(-share)) - cost;
+        test.refitted = [&fit, lines, cost](double) {
             const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), nullptr, -1), fit.rows());
             return with.gain_over(fit) - cost;
         };
     }
-    views.push_back(std::move(view));
+    tests.push_back(std::move(test));
 }
 
 /// Variation of a line over the record, by its amplitudes in stretches. `cosine` is the column of its cosine.
@@ -151,11 +153,11 @@ OverTime line_over_time(const SampleFit& fit, std::size_t cosine) {
     return {chi2_tail(chi2, freedom), power, chi2 - freedom};
 }
 
-void test_lines(const SampleFit& fit, Views& views) {
+void test_lines(const SampleFit& fit, SampleResidualTests& tests) {
     const auto& columns = fit.model().columns;
     const auto lines = std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c.name == "cosine"; });
     if (lines == 0) return;
-    views.push_back({{Where::amplitude, "amplitude and phase of the lines over time", unsteady_line(fit).p_value, ""}});
+    tests.push_back({{Where::amplitude, "amplitude and phase of the lines over time", unsteady_line(fit).p_value, ""}});
 }
 
 }  // namespace
@@ -172,7 +174,7 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
         if (least.step >= 0 && found.p_value >= least.p_value) continue;
         power = found.power;
         least = {.step = columns[c].step,
-                 .hz = columns[c].course.hz,
+                 .hz = columns[c].track.hz,
                  .p_value = found.p_value,
                  .off = found.off / std::max(power, 1e-300)};
     }
@@ -180,47 +182,47 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     if (least.step < 0) return least;
     std::vector<double> e(fit.innovations().size(), 0.0);
     for (std::size_t i = 0; i < e.size(); ++i) {
-        if (fit.telling()[i]) e[i] = fit.innovations()[i];
+        if (fit.informative()[i]) e[i] = fit.innovations()[i];
     }
     const FoundLines left = find_lines(e, fit.series().rate_hz);
     const FoundLine line = left.likeliest();
     const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
     if (line.p_value < options.level_of_residual &&
-        std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < options.samples.lines.beside_hz) {
-        least.beside = std::max(line.chi2, left.scattered) / std::max(power, 1e-300);
+        std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < options.samples.lines.adjacent_hz) {
+        least.adjacent = std::max(line.chi2, left.scattered) / std::max(power, 1e-300);
     }
     return least;
 }
 
-SampleFit fit_beside(const SampleFit& fit, const SampleView& view) {
+SampleFit fit_with_columns(const SampleFit& fit, const SampleResidualTest& test) {
     SampleModel model = fit.model();
-    for (auto& column : view.columns()) {
+    for (auto& column : test.columns()) {
         model.columns.push_back({nullptr, "view", std::make_shared<const std::vector<double>>(std::move(column))});
-        model.columns.back().as_recorded = view.hz.has_value();
+        model.columns.back().as_recorded = test.hz.has_value();
     }
     return {fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near};
 }
 
-double refitted_merit(const SampleFit& fit, const SampleView& view) {
-    return fit_beside(fit, view).gain_over(fit) - view.cost;
+double refitted_evidence(const SampleFit& fit, const SampleResidualTest& test) {
+    return fit_with_columns(fit, test).gain_over(fit) - test.cost;
 }
 
-std::vector<SampleView> view_samples(const SampleFit& fit, double lattice_arcsec) {
-    Views views;
-    test_correlation(fit, views);
-    test_spectrum(fit, views);
-    view_sizes(fit, lattice_arcsec, views);
-    view_followed(fit, views);
-    view_rates(fit, views);
-    test_lines(fit, views);
+std::vector<SampleResidualTest> test_residual(const SampleFit& fit, double lattice_arcsec) {
+    SampleResidualTests tests;
+    test_correlation(fit, tests);
+    test_spectrum(fit, tests);
+    test_sizes(fit, lattice_arcsec, tests);
+    test_followed(fit, tests);
+    test_rate_patterns(fit, tests);
+    test_lines(fit, tests);
     if (!fit.series().witnesses.empty()) {
-        const FoundWitness witness = find_witness(fit.innovations(), fit.telling(), fit.series());
+        const FoundWitness witness = find_witness(fit.innovations(), fit.informative(), fit.series());
         if (witness.lags > 0 && !witness.name.empty()) {
-            views.push_back(
+            tests.push_back(
                 {{Where::frequency, "witnesses at lags up to a quarter of a second", witness.p_value, witness.name}});
         }
     }
-    return views;
+    return tests;
 }
 
 }  // namespace ringlock::closure

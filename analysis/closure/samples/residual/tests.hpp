@@ -2,7 +2,7 @@
 #include <string_view>
 #include <vector>
 
-#include "analysis/closure/decide/view.hpp"
+#include "analysis/closure/decide/residual_test.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 
 namespace ringlock::closure {
@@ -20,7 +20,7 @@ struct Disturbed {
 Disturbed find_disturbed(const SampleFit& fit, const Rows& rows);
 
 /// A residual test of samples, with the columns of its regression as series of increments.
-using SampleView = View<std::vector<double>>;
+using SampleResidualTest = ResidualTestOn<std::vector<double>>;
 
 /// The test of a variance that oscillates.
 inline constexpr std::string_view repeating_variance = "variance and covariance that repeat";
@@ -34,22 +34,22 @@ inline constexpr std::string_view followed_witnesses = "rates that follow the wi
 /// Tests the innovations that count against all quantities of the record: time, frequency, the place in the record
 /// modulo small numbers, witnesses, temperature, input rate, their own size. The tests refer to the fit.
 /// \param lattice_arcsec  quantisation of the values, with which they are not normal
-std::vector<SampleView> view_samples(const SampleFit& fit, double lattice_arcsec);
+std::vector<SampleResidualTest> test_residual(const SampleFit& fit, double lattice_arcsec);
 
 /// The line of the model whose amplitude and phase vary most.
 struct UnsteadyLine {
     int step = -1;  ///< step of the loop that added it; -1: there is none
     double hz = 0.0;
     double p_value = 1.0;
-    double off = 0.0;     ///< power of its variations relative to that of the line
-    double beside = 0.0;  ///< power of another line within beside_hz of it, relative to that of the line
+    double off = 0.0;       ///< power of its variations relative to that of the line
+    double adjacent = 0.0;  ///< power of another line within beside_hz of it, relative to that of the line
 };
 UnsteadyLine unsteady_line(const SampleFit& fit);
 
 /// The model with the regression of a residual test, the noise fitted again with it.
-SampleFit fit_beside(const SampleFit& fit, const SampleView& view);
+SampleFit fit_with_columns(const SampleFit& fit, const SampleResidualTest& test);
 
 /// Gain of the log-likelihood by that regression, less its cost.
-double refitted_merit(const SampleFit& fit, const SampleView& view);
+double refitted_evidence(const SampleFit& fit, const SampleResidualTest& test);
 
 }  // namespace ringlock::closure

@@ -23,7 +23,7 @@ void RoundedSamples::restore() {
     series_.increment = measured_;
     step_ = 0.0;
     draws_ = 0;
-    summit_.reset();
+    maximum_.reset();
     wandering_.reset();
 }
 
@@ -43,11 +43,11 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
     // The noise of the rate may contain the error of rounding between two steps of the values.
     filters_ = filters_for(step_, now.sd(measured_.size() / 2));
-    summit_ = towards_summit(now, rounded(), of.first_look, of.climbs_at_start);
+    maximum_ = towards_maximum(now, rounded(), of.first_look, of.steps_at_start);
     wandering_.reset();
-    const SampleFit there(series_, summit_->model, fit.rows(), SampleFit::Noise::all_held);
+    const SampleFit there(series_, maximum_->model, fit.rows(), SampleFit::Noise::all_held);
     filters_ = filters_for(step_, there.sd(measured_.size() / 2));
-    auto drawn = draw_by(summit_->model, summit_->model, fit.rows());
+    auto drawn = draw_by(maximum_->model, maximum_->model, fit.rows());
     for (int round = 0; round < of.rounds_at_start; ++round) drawn = draw(std::move(drawn), of.draws_a_round);
     return drawn;
 }
@@ -55,15 +55,15 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
 std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& drawing, const SampleModel& model,
                                                    const Rows& rows) {
     const SampleFit by(series_, drawing, rows, SampleFit::Noise::all_held);
-    series_.increment = unround(by, rounded(), ++draws_);
+    series_.increment = impute(by, rounded(), ++draws_);
     return std::make_shared<SampleFit>(series_, model, rows, SampleFit::Noise::near);
 }
 
 std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, int rounds) {
     for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->model(), fit->rows());
     const SampleModel drawing = likeliest(*fit);
-    const bool beside_walk = drawing.walk && !fit->model().walk;
-    return draw_by(drawing, beside_walk ? fit->model() : drawing, fit->rows());
+    const bool with_walk = drawing.walk && !fit->model().walk;
+    return draw_by(drawing, with_walk ? fit->model() : drawing, fit->rows());
 }
 
 /// Growth of the variance of a random walk of the rate, from the differences between means of successive stretches;
@@ -91,36 +91,36 @@ double RoundedSamples::wander(const SampleFit& fit) const {
 /// Imputations follow the noise of the model. Where the model lacks a slow rate, and a random walk, which follows that
 /// rate, makes the increments likelier by far, they are imputed with the walk.
 SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
-    summit_ = find_summit(fit, rounded(), options.samples.rounded.climbs, near(fit.model()));
+    maximum_ = find_maximum(fit, rounded(), options.samples.rounded.most_steps, near(fit.model()));
     const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
-    if (walk == 0.0) return summit_->model;
-    SampleModel beside = summit_->model;
-    beside.walk = true;
-    beside.noise.walk_arcsec2_s3 = walk;
-    const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
-    wandering_ = towards_summit(start, rounded(), measured_.size(), options.samples.rounded.climbs_with_walk,
-                                wandering_ ? &*wandering_ : nullptr);
-    return wandering_->log_likelihood > summit_->log_likelihood + options.samples.rounded.drawn_beside_walk
+    if (walk == 0.0) return maximum_->model;
+    SampleModel walking = maximum_->model;
+    walking.walk = true;
+    walking.noise.walk_arcsec2_s3 = walk;
+    const SampleFit start(series_, std::move(walking), fit.rows(), SampleFit::Noise::all_held);
+    wandering_ = towards_maximum(start, rounded(), measured_.size(), options.samples.rounded.steps_with_walk,
+                                 wandering_ ? &*wandering_ : nullptr);
+    return wandering_->log_likelihood > maximum_->log_likelihood + options.samples.rounded.drawn_with_walk
                ? wandering_->model
-               : summit_->model;
+               : maximum_->model;
 }
 
-const RoundedSummit* RoundedSamples::near(const SampleModel& model) const {
-    if (model.walk && wandering_ && !(summit_ && summit_->model.walk)) return &*wandering_;
-    return summit_ ? &*summit_ : nullptr;
+const RoundedMaximum* RoundedSamples::near(const SampleModel& model) const {
+    if (model.walk && wandering_ && !(maximum_ && maximum_->model.walk)) return &*wandering_;
+    return maximum_ ? &*maximum_ : nullptr;
 }
 
 ResidualTest RoundedSamples::test(const SampleFit& fit) const {
-    const Foretold foretold = foretell_rounded(fit, rounded());
+    const Prediction predicted = predict_rounded(fit, rounded());
     double off = 0.0;
     double said = 0.0;
     double of_squares = 0.0;
     for (std::size_t i = 0; i < measured_.size(); ++i) {
         if (!fit.rows()[i]) continue;
-        const double variance = foretold.variance[i];
-        off += std::pow(measured_[i] - foretold.mean[i], 2);
+        const double variance = predicted.variance[i];
+        off += std::pow(measured_[i] - predicted.mean[i], 2);
         said += variance;
-        of_squares += foretold.fourth_moment[i] - variance * variance;
+        of_squares += predicted.fourth_moment[i] - variance * variance;
     }
     const double z =
         (std::abs(off - said) - options.samples.rounded.filters_off * said) / std::sqrt(std::max(of_squares, 1e-300));
@@ -129,15 +129,15 @@ ResidualTest RoundedSamples::test(const SampleFit& fit) const {
 }
 
 SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported) const {
-    const Foretold foretold = foretell_rounded(fit, rounded());
+    const Prediction predicted = predict_rounded(fit, rounded());
     SampleScore score;
     double count = 0.0;
     for (std::size_t i = 0; i < reported.size(); ++i) {
-        if (fit.rows()[i]) score.log_likelihood += foretold.log_probability[i];
+        if (fit.rows()[i]) score.log_likelihood += predicted.log_probability[i];
         if (!reported[i]) continue;
-        score.error += std::pow(measured_[i] - foretold.mean[i], 2);
-        score.floor += foretold.variance[i];
-        score.log_score += foretold.log_probability[i] - std::log(step_);
+        score.error += std::pow(measured_[i] - predicted.mean[i], 2);
+        score.floor += predicted.variance[i];
+        score.log_score += predicted.log_probability[i] - std::log(step_);
         count += 1.0;
     }
     score.error = std::sqrt(score.error / std::max(count, 1.0));
@@ -148,10 +148,10 @@ SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported)
 SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
                                          const std::function<SampleFigures(const SampleFit&)>& figures) {
     constexpr int several = options.samples.rounded.draws_of_figures;
-    summit_ = find_summit(fit, rounded(), options.samples.rounded.climbs_of_figures, near(fit.model()));
-    const RoundedSummit& summit = *summit_;
+    maximum_ = find_maximum(fit, rounded(), options.samples.rounded.steps_of_figures, near(fit.model()));
+    const RoundedMaximum& maximum = *maximum_;
     std::vector<SampleFigures> all;
-    for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, summit.model, fit.rows())));
+    for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(maximum.model, maximum.model, fit.rows())));
     SampleFigures mean = all.front();
     const auto combine = [&](const auto& of) {
         double sum = 0.0;
@@ -174,14 +174,14 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
         }
     }
     // Imputations by one model differ less than models that are nearly as likely.
-    const SampleNoise& noise = summit.model.noise;
+    const SampleNoise& noise = maximum.model.noise;
     const auto known_to = [&](Estimate& estimate, double value, std::size_t of) {
-        if (!std::isfinite(summit.noise_log_sd[of])) return;
+        if (!std::isfinite(maximum.noise_log_sd[of])) return;
         estimate.value = value;
-        estimate.sd = std::max(estimate.sd, value * summit.noise_log_sd[of]);
+        estimate.sd = std::max(estimate.sd, value * maximum.noise_log_sd[of]);
     };
     for (Estimate& estimate : mean.base) {
-        if (estimate.name == "mean_rate_deg_h") estimate.sd *= summit.column_times.front();
+        if (estimate.name == "mean_rate_deg_h") estimate.sd *= maximum.column_times.front();
         if (estimate.name == "white_angle_arcsec") known_to(estimate, noise.angle_arcsec, 0);
         if (estimate.name == "white_rate_deg_rt_h") {
             known_to(estimate, noise.rate_arcsec_rt_s * units::deg_rt_h_per_arcsec_rt_s, 1);
@@ -190,15 +190,15 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
     for (std::size_t s = 0; s < mean.steps.size(); ++s) {
         for (Estimate& estimate : mean.steps[s]) {
             double times = 1.0;
-            for (std::size_t k = 0; k < summit.column_times.size(); ++k) {
-                const effects::Effect* effect = summit.model.columns[k].effect;
+            for (std::size_t k = 0; k < maximum.column_times.size(); ++k) {
+                const effects::Effect* effect = maximum.model.columns[k].effect;
                 const bool same = effect != nullptr && effect->name() == estimate.effect;
-                if (same) times = std::max(times, summit.column_times[k]);
+                if (same) times = std::max(times, maximum.column_times[k]);
             }
             estimate.sd *= times;
             const effects::Effect* effect = effects::find(estimate.effect);
             if (effect == nullptr) continue;
-            if (on_samples(*effect) == OnSamples::flicker) known_to(estimate, summit.model.flicker_deg_h, 2);
+            if (on_samples(*effect) == OnSamples::flicker) known_to(estimate, maximum.model.flicker_deg_h, 2);
             if (on_samples(*effect) == OnSamples::walk) known_to(estimate, deviation_of_walk(*effect, noise), 2);
         }
     }

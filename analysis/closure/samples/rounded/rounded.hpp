@@ -9,7 +9,7 @@
 #include "analysis/closure/samples/fit/figures.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/score.hpp"
-#include "analysis/closure/samples/rounded/summit.hpp"
+#include "analysis/closure/samples/rounded/maximum.hpp"
 #include "analysis/closure/samples/rounded/unrounding.hpp"
 
 namespace ringlock::closure {
@@ -46,7 +46,7 @@ class RoundedSamples {
     std::shared_ptr<SampleFit> draw_by(const SampleModel& drawing, const SampleModel& model, const Rows& rows);
     double wander(const SampleFit& fit) const;
     SampleModel likeliest(const SampleFit& fit);
-    const RoundedSummit* near(const SampleModel& model) const;
+    const RoundedMaximum* near(const SampleModel& model) const;
     RoundedIncrements rounded() const { return {measured_, step_, filters_}; }
 
     SampleSeries& series_;
@@ -54,8 +54,8 @@ class RoundedSamples {
     double step_ = 0.0;
     std::size_t filters_ = 0;
     std::uint64_t draws_ = 0;
-    std::optional<RoundedSummit> summit_;     ///< the last one
-    std::optional<RoundedSummit> wandering_;  ///< with a random walk that the model lacks
+    std::optional<RoundedMaximum> maximum_;    ///< the last one
+    std::optional<RoundedMaximum> wandering_;  ///< with a random walk that the model lacks
 };
 
 }  // namespace ringlock::closure

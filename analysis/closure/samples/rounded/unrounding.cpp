@@ -45,7 +45,7 @@ class Mixture {
     /// Processes the next increment and draws its reading.
     void go_on();
     /// Distribution of the next increment.
-    void foretell(Foretold& foretold) const;
+    void predict(Prediction& predicted) const;
     std::vector<double> path();
     double log_probability() const { return log_probability_; }
 
@@ -71,7 +71,7 @@ class Mixture {
     std::vector<std::uint8_t> parent_;  ///< index of the filter that each continued
     SampleFilter::Many filters_;
     std::vector<double> weight_;
-    std::vector<double> foretold_;    ///< next reading
+    std::vector<double> predicted_;   ///< next reading
     std::vector<double> innovation_;  ///< of the last reading
     std::vector<double> low_, share_, probability_;
     std::vector<std::uint64_t> key_;  ///< rank of a filter by its prediction, with its index in the last byte
@@ -98,7 +98,7 @@ Mixture::Mixture(const SampleFit& fit, const RoundedIncrements& rounded, std::ui
       parent_(drawn_.size()),
       filters_(filter_, within(count_, step_)),
       weight_(count_, 1.0 / static_cast<double>(count_)),
-      foretold_(count_),
+      predicted_(count_),
       innovation_(count_),
       low_(count_),
       share_(count_),
@@ -114,8 +114,8 @@ Mixture::Mixture(const SampleFit& fit, const RoundedIncrements& rounded, std::ui
 void Mixture::advance() {
     if (row_ == rounded_.size()) return;
     determined_ += no_noise_[row_];
-    filters_.foretell(foretold_);
-    for (double& reading : foretold_) reading += determined_;
+    filters_.predict(predicted_);
+    for (double& reading : predicted_) reading += determined_;
     draw_anew();
 }
 
@@ -124,16 +124,16 @@ void Mixture::advance() {
 /// function of the model (Malik and Pitt, J. Econom. 165, 190, 2011).
 void Mixture::draw_anew() {
     constexpr double same = 1e-9;
-    constexpr double places = 0x1p54;
+    constexpr double steps = 0x1p54;
     const double start = uniform();
     std::uint8_t* parent = parent_.data() + at_row(row_ + 1);
     std::iota(parent, parent + count_, std::uint8_t{0});
     const auto [least, most] = std::minmax_element(weight_.begin(), weight_.end());
     if (*most - *least < same * *most) return;
-    const auto [lowest, highest] = std::minmax_element(foretold_.begin(), foretold_.end());
-    const double scale = places / std::max(*highest - *lowest, 1e-300);
+    const auto [lowest, highest] = std::minmax_element(predicted_.begin(), predicted_.end());
+    const double scale = steps / std::max(*highest - *lowest, 1e-300);
     for (std::size_t p = 0; p < count_; ++p) {
-        key_[p] = static_cast<std::uint64_t>((foretold_[p] - *lowest) * scale) << 8U | p;
+        key_[p] = static_cast<std::uint64_t>((predicted_[p] - *lowest) * scale) << 8U | p;
     }
     sorter_(key_.data(), count_, hwy::SortAscending());
     const auto at_place = [&](std::size_t k) { return static_cast<std::uint8_t>(key_[k] & 0xFFU); };
@@ -146,8 +146,8 @@ void Mixture::draw_anew() {
     }
     std::copy(parent, parent + count_, from_.begin());
     filters_.continue_from(from_);
-    for (std::size_t p = 0; p < count_; ++p) innovation_[p] = foretold_[from_[p]];
-    foretold_.swap(innovation_);
+    for (std::size_t p = 0; p < count_; ++p) innovation_[p] = predicted_[from_[p]];
+    predicted_.swap(innovation_);
     std::fill(weight_.begin(), weight_.end(), 1.0 / static_cast<double>(count_));
 }
 
@@ -156,7 +156,7 @@ void Mixture::go_on() {
     const double sd = filter_.sd(row_);
     const double width = step_ / sd;
     total_ += rounded_[row_];
-    for (std::size_t p = 0; p < count_; ++p) low_[p] = (total_ - 0.5 * step_ - foretold_[p]) / sd;
+    for (std::size_t p = 0; p < count_; ++p) low_[p] = (total_ - 0.5 * step_ - predicted_[p]) / sd;
     for (double& share : share_) share = uniform();
     normals_between(low_, width, share_, probability_, innovation_);
     double sum = 0.0;
@@ -181,16 +181,16 @@ double Mixture::distance(double width) const {
     return 0.5 * nearest * nearest;
 }
 
-void Mixture::foretell(Foretold& foretold) const {
+void Mixture::predict(Prediction& predicted) const {
     constexpr double reach = 4.5;
     constexpr double most_steps = 60.0;
     const double sd = filter_.sd(row_);
-    const auto [lowest, highest] = std::minmax_element(foretold_.begin(), foretold_.end());
+    const auto [lowest, highest] = std::minmax_element(predicted_.begin(), predicted_.end());
     const double first = std::floor((*lowest - reach * sd - total_) / step_ + 0.5);
     const double last = std::min(std::floor((*highest + reach * sd - total_) / step_ + 0.5), first + most_steps);
     std::vector<double> above(count_);
     const auto tail = [&](std::size_t p, double m) {
-        return upper_tail((total_ + (m - 0.5) * step_ - foretold_[p]) / sd);
+        return upper_tail((total_ + (m - 0.5) * step_ - predicted_[p]) / sd);
     };
     for (std::size_t p = 0; p < count_; ++p) above[p] = tail(p, first);
     std::vector<double> probabilities;
@@ -212,9 +212,9 @@ void Mixture::foretell(Foretold& foretold) const {
         variance += probabilities[k] * square;
         fourth += probabilities[k] * square * square;
     }
-    foretold.mean.push_back(mean);
-    foretold.variance.push_back(variance);
-    foretold.fourth_moment.push_back(fourth);
+    predicted.mean.push_back(mean);
+    predicted.variance.push_back(variance);
+    predicted.fourth_moment.push_back(fourth);
 }
 
 std::vector<double> Mixture::path() {
@@ -232,23 +232,23 @@ std::vector<double> Mixture::path() {
 
 }  // namespace
 
-std::vector<double> unround(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed) {
+std::vector<double> impute(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed) {
     check_interrupt();
     Mixture mixture(fit, rounded, seed, Mixture::Paths::kept);
     for (std::size_t k = 0; k < rounded.arcsec.size(); ++k) mixture.go_on();
     return mixture.path();
 }
 
-Foretold foretell_rounded(const SampleFit& fit, const RoundedIncrements& rounded) {
+Prediction predict_rounded(const SampleFit& fit, const RoundedIncrements& rounded) {
     check_interrupt();
     Mixture mixture(fit, rounded, 0, Mixture::Paths::forgotten);
-    Foretold foretold;
+    Prediction predicted;
     for (std::size_t k = 0; k < rounded.arcsec.size(); ++k) {
-        mixture.foretell(foretold);
+        mixture.predict(predicted);
         mixture.go_on();
-        foretold.log_probability.push_back(mixture.log_probability());
+        predicted.log_probability.push_back(mixture.log_probability());
     }
-    return foretold;
+    return predicted;
 }
 
 double log_likelihood_of_rounded(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until) {

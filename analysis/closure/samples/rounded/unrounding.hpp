@@ -26,13 +26,13 @@ std::size_t filters_for(double step_arcsec, double sd_arcsec);
 /// Each filter draws every reading from its prediction, within the step that was recorded; the filters are resampled by
 /// the probabilities that they gave to the step. One path through them is returned. If the model is true it is
 /// distributed as the increments before rounding.
-std::vector<double> unround(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed);
+std::vector<double> impute(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed);
 
 /// Distribution of each rounded increment, predicted by the same filters from the increments before it.
-struct Foretold {
+struct Prediction {
     std::vector<double> mean, variance, fourth_moment, log_probability;
 };
-Foretold foretell_rounded(const SampleFit& fit, const RoundedIncrements& rounded);
+Prediction predict_rounded(const SampleFit& fit, const RoundedIncrements& rounded);
 
 /// Log-likelihood of the rounded increments up to row `until`, over rows that count in the fit. It has a random error
 /// of some units, which is nearly the same for models near each other: a difference of ten has an error of a few

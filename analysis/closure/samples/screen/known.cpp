@@ -17,14 +17,14 @@ using effects::Role;
 namespace {
 
 /// The line's frequency in the middle of the record and its derivatives; free up to the last that is not zero.
-LineCourse course_of(const ActiveEffect& active) {
+FrequencyTrack track_of(const ActiveEffect& active) {
     const auto parameters = parameters_of(*active.effect, Role::frequency);
-    LineCourse course = LineCourse::still(value_of(active.values, *parameters[0]));
-    for (std::size_t k = 1; k < std::min(parameters.size(), LineCourse::most); ++k) {
-        course.coefficient(k) = value_of(active.values, *parameters[k]);
-        if (course.coefficient(k) != 0.0) course.free = k + 1;
+    FrequencyTrack track = FrequencyTrack::still(value_of(active.values, *parameters[0]));
+    for (std::size_t k = 1; k < std::min(parameters.size(), FrequencyTrack::most); ++k) {
+        track.coefficient(k) = value_of(active.values, *parameters[k]);
+        if (track.coefficient(k) != 0.0) track.free = k + 1;
     }
-    return course;
+    return track;
 }
 
 }  // namespace
@@ -45,9 +45,9 @@ KnownEffects known_effects(const SampleFit& base, const std::vector<ActiveEffect
         switch (on_samples(effect)) {
             case OnSamples::rate_line:
             case OnSamples::angle_line: {
-                const LineCourse course = course_of(active);
-                const Alias shown = alias(course.hz, from_hz > 0.0 ? from_hz : series.rate_hz);
-                add_line(model, series, course.shown_at(shown.hz, shown.folded), effect, added.id);
+                const FrequencyTrack track = track_of(active);
+                const Alias shown = alias(track.hz, from_hz > 0.0 ? from_hz : series.rate_hz);
+                add_line(model, series, track.shown_at(shown.hz, shown.folded), effect, added.id);
                 break;
             }
             case OnSamples::motion: {

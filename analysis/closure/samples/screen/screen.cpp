@@ -74,13 +74,13 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     double best = 0.0;
     std::size_t at = 0;
     const double root_of_worth = std::sqrt(worth);
-    const std::size_t places = options.samples.fit.places_of_a_step;
-    for (std::size_t k = 1; k < places; ++k) {
-        const double root = root_of_worth * root_of_step(now, n * k / places);
+    const std::size_t positions = options.samples.fit.positions_of_step;
+    for (std::size_t k = 1; k < positions; ++k) {
+        const double root = root_of_worth * root_of_step(now, n * k / positions);
         roots.push_back(root);
         if (std::abs(root) > best) {
             best = std::abs(root);
-            at = n * k / places;
+            at = n * k / positions;
         }
     }
     double as_good = 0.0;
@@ -88,21 +88,21 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     SampleCandidate& c = *candidate;
     c.model = model;
     c.p_value = davies_bound(best * best, roots);
-    c.places = static_cast<double>(places) / as_good;
-    at = refine_place(now, at, n / places / 2);
+    c.positions = static_cast<double>(positions) / as_good;
+    at = refine_place(now, at, n / positions / 2);
     best = root_of_worth * std::abs(root_of_step(now, at));
-    c.searched = places_of_step(best * best, 0.5 / static_cast<double>(places));
+    c.look_elsewhere = look_elsewhere_of_step(best * best, 0.5 / static_cast<double>(positions));
     // With a random rate, a step that decays within less than the distance of these places is visible near its time
     // only.
-    const auto jump = jump_beside_random(now);
-    if (jump && jump->length < n / places) {
+    const auto jump = jump_with_random_rate(now);
+    if (jump && jump->length < n / positions) {
         const std::size_t place = refine_place(now, jump->row, jump->length);
         const double root = root_of_worth * std::abs(root_of_step(now, place));
         if (root > best) {
             at = place;
-            c.searched = jump->places;
-            c.places = jump->places;
-            c.p_value = of_several(chi2_tail(root * root, 1), jump->places);
+            c.look_elsewhere = jump->positions;
+            c.positions = jump->positions;
+            c.p_value = of_several(chi2_tail(root * root, 1), jump->positions);
         }
     }
     if (c.p_value > by.step_p) return;
@@ -180,7 +180,7 @@ std::optional<SampleCandidate> weak_motion(const SampleFit& now, const SampleCon
     if (!candidate) return std::nullopt;
     candidate->model = now.model();
     candidate->p_value = p;
-    candidate->searched = 2.0 * count;
+    candidate->look_elsewhere = 2.0 * count;
     candidate->parameters = rank;
     candidate->freedom = rank;
     candidate->witness = at;
@@ -203,7 +203,7 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
     if (!candidate) return;
     candidate->model = moved_as(now, *candidate->effect, witness.index, in.step);
     candidate->p_value = witness.p_value;
-    candidate->searched = static_cast<double>(in.series.witnesses.size());
+    candidate->look_elsewhere = static_cast<double>(in.series.witnesses.size());
     candidate->parameters = 2 * witness.lags + 1;
     candidate->freedom = 2 * witness.lags + 1;
     candidate->strong = true;

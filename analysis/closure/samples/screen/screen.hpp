@@ -17,22 +17,22 @@ struct SampleCandidate {
     SampleModel model = {};  ///< to be fitted
     double p_value = 1.0;
     /// Look-elsewhere factor of the search.
-    double searched = 1.0;
+    double look_elsewhere = 1.0;
     /// Number of positions searched, divided by the number that explain as much: the cost of the search where the
-    /// likelihood is integrated over places. `searched` if not given.
-    std::optional<double> places = {};
+    /// likelihood is integrated over places. `look_elsewhere` if not given.
+    std::optional<double> positions = {};
     int parameters = 1;
-    int freedom = 1;          ///< degrees of freedom of its chi-squared, without the search
-    double hz = 0.0;          ///< of a line, frequency at which the record shows it
-    bool wanders = false;     ///< a line that is modelled as a narrow resonance
-    bool strong = false;      ///< a motion that is fitted at many lags of its witness
-    bool nameless = false;    ///< not a library effect; fitted so that it does not mask others
-    std::size_t witness = 0;  ///< of a motion: index in the series
+    int freedom = 1;           ///< degrees of freedom of its chi-squared, without the search
+    double hz = 0.0;           ///< of a line, frequency at which the record shows it
+    bool wanders = false;      ///< a line that is modelled as a narrow resonance
+    bool strong = false;       ///< a motion that is fitted at many lags of its witness
+    bool placeholder = false;  ///< not a library effect; fitted so that it does not mask others
+    std::size_t witness = 0;   ///< of a motion: index in the series
     SampleFit::Noise noise = SampleFit::Noise::near;
     Effects confounded = {};  ///< effects that make the same model
 
     std::shared_ptr<SampleFit> fit = {};  ///< full fit; null while there is only a score test
-    double merit = 0.0;                   ///< gain of the log-likelihood less the cost of search and parameters
+    double evidence = 0.0;                ///< gain of the log-likelihood less the cost of search and parameters
     bool passes = false;                  ///< whether that gain passes the level of one effect
 };
 
@@ -59,8 +59,8 @@ struct SampleContext {
 /// temperature or its slope, to the input rate. Effects whose rate does not change in the record have no column.
 std::vector<SampleColumn> rate_columns(const SampleSeries& series,
                                        std::span<const effects::Effect* const> library = effects::registry());
-void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
-              int step);
+void add_line(SampleModel& model, const SampleSeries& series, const FrequencyTrack& track,
+              const effects::Effect& effect, int step);
 /// The model of readings that were taken at that rate and interpolated, with the most likely place of the record's
 /// start in the source's interval.
 SampleModel resampled_from(const SampleFit& now, double from_hz);

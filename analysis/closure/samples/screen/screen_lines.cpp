@@ -36,7 +36,7 @@ struct OfferedLine {
 };
 
 void take_share(FoundLine& line, double share) {
-    line.searched /= share;
+    line.look_elsewhere /= share;
     line.p_value = std::min(1.0, line.p_value / share);
 }
 
@@ -77,7 +77,7 @@ std::optional<SampleCandidate> wandering_line(const SampleFit& now, const Sample
     auto candidate = candidate_of(OnSamples::angle_line);
     if (!candidate) return std::nullopt;
     candidate->p_value = p_value;
-    candidate->searched = lines.tracked.searched;
+    candidate->look_elsewhere = lines.tracked.look_elsewhere;
     candidate->parameters = 3;
     candidate->freedom = 3;
     candidate->hz = lines.scattered_hz;
@@ -87,11 +87,11 @@ std::optional<SampleCandidate> wandering_line(const SampleFit& now, const Sample
 }
 
 /// Whether the lowest frequency of the line is too low to distinguish it from a slow rate.
-bool is_slow(const LineCourse& course, double duration_s) {
-    constexpr int places = 64;
-    for (int i = 0; i <= places; ++i) {
-        const double since_middle_s = duration_s * (static_cast<double>(i) / places - 0.5);
-        if (course.frequency_hz(since_middle_s) * duration_s < options.samples.lines.fewest_cycles) return true;
+bool is_slow(const FrequencyTrack& track, double duration_s) {
+    constexpr int positions = 64;
+    for (int i = 0; i <= positions; ++i) {
+        const double since_middle_s = duration_s * (static_cast<double>(i) / positions - 0.5);
+        if (track.frequency_hz(since_middle_s) * duration_s < options.samples.lines.fewest_cycles) return true;
     }
     return false;
 }
@@ -101,19 +101,20 @@ std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleConte
                                          const std::vector<double>& e) {
     auto candidate = candidate_of(OnSamples::angle_line);
     if (!candidate) return std::nullopt;
-    const FoundCourse found = follow_bends(e, in.series.rate_hz, lines);
-    if (found.course.free < 3) return std::nullopt;
-    const SampleLine line = refine_line(now, found.course);
-    if (is_slow(line.course, static_cast<double>(in.series.size()) * in.series.interval_s)) return std::nullopt;
+    const FoundTrack found = follow_bends(e, in.series.rate_hz, lines);
+    if (found.track.free < 3) return std::nullopt;
+    const SampleLine line = refine_line(now, found.track);
+    if (is_slow(line.track, static_cast<double>(in.series.size()) * in.series.interval_s)) return std::nullopt;
     if (scatters(now, e, lines, line)) return std::nullopt;
-    const double searched = places_of_bends(line.chi2, 0.5 * static_cast<double>(e.size()), found.course.free);
+    const double look_elsewhere =
+        look_elsewhere_of_track(line.chi2, 0.5 * static_cast<double>(e.size()), found.track.free);
     candidate->model = now.model();
-    candidate->p_value = of_several(chi2_tail(line.chi2, 2), searched);
-    candidate->searched = searched;
+    candidate->p_value = of_several(chi2_tail(line.chi2, 2), look_elsewhere);
+    candidate->look_elsewhere = look_elsewhere;
     candidate->parameters = 2;
     candidate->freedom = 2;
     candidate->hz = lines.scattered_hz;
-    add_line(candidate->model, in.series, line.course, *candidate->effect, in.step);
+    add_line(candidate->model, in.series, line.track, *candidate->effect, in.step);
     return candidate;
 }
 
@@ -150,8 +151,8 @@ void screen_lines(const SampleFit& now, const SampleContext& in, std::vector<Sam
     const FoundLines lines = find_lines(e, in.series.rate_hz, in.lines_hz, width_hz);
     const FoundLine likeliest = lines.likeliest();
     const auto refined = [&](const FoundLine& line, bool drifts) {
-        return refine_line(now, drifts ? LineCourse::even(line.frequency_hz, line.drift_hz_per_s)
-                                       : LineCourse::still(line.frequency_hz));
+        return refine_line(now, drifts ? FrequencyTrack::even(line.frequency_hz, line.drift_hz_per_s)
+                                       : FrequencyTrack::still(line.frequency_hz));
     };
     bool scattered = false;
     if (likeliest.p_value < by.line_p) {
@@ -160,7 +161,7 @@ void screen_lines(const SampleFit& now, const SampleContext& in, std::vector<Sam
         const bool declared = near_declared(now, in, lines.scattered_hz);
         const auto offer = [&](std::optional<SampleCandidate> candidate) {
             if (!candidate) return;
-            candidate->nameless = !declared && lines.scattered_hz <= by.fast_hz;
+            candidate->placeholder = !declared && lines.scattered_hz <= by.fast_hz;
             if (!declared) confound(*candidate, OnSamples::rate_line);
             out.push_back(*std::move(candidate));
         };
@@ -182,36 +183,36 @@ void screen_lines(const SampleFit& now, const SampleContext& in, std::vector<Sam
     }
     for (const OfferedLine& line : offered) {
         if (!(line.found.p_value < by.refined_line_p)) continue;
-        if (scattered && std::abs(line.found.frequency_hz - lines.scattered_hz) < options.samples.lines.beside_hz)
+        if (scattered && std::abs(line.found.frequency_hz - lines.scattered_hz) < options.samples.lines.adjacent_hz)
             continue;
         const SampleLine mended = refined(line.found, line.drifts);
         // A line that hardly drifts is described as well without the drift.
-        if (line.drifts && !(std::abs(mended.course.drifts[0]) * duration_s * duration_s > by.least_drift_cycles))
+        if (line.drifts && !(std::abs(mended.track.drifts[0]) * duration_s * duration_s > by.least_drift_cycles))
             continue;
-        const bool fast = mended.course.hz > by.fast_hz;
+        const bool fast = mended.track.hz > by.fast_hz;
         const bool dither = line.declared || line.drifts;
         const OnSamples as = dither || fast ? OnSamples::angle_line : OnSamples::rate_line;
         auto candidate = candidate_of(as);
         if (!candidate) continue;
         candidate->model = now.model();
-        candidate->p_value = of_several(chi2_tail(mended.chi2, 2), line.found.searched);
-        candidate->searched = line.found.searched;
+        candidate->p_value = of_several(chi2_tail(mended.chi2, 2), line.found.look_elsewhere);
+        candidate->look_elsewhere = line.found.look_elsewhere;
         candidate->parameters = 2;
         candidate->freedom = 2;
         candidate->hz = line.found.frequency_hz;
         if (!dither) confound(*candidate, fast ? OnSamples::rate_line : OnSamples::angle_line);
-        add_line(candidate->model, in.series, mended.course, *candidate->effect, in.step);
+        add_line(candidate->model, in.series, mended.track, *candidate->effect, in.step);
         out.push_back(*std::move(candidate));
     }
 }
 
-void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
-              int step) {
+void add_line(SampleModel& model, const SampleSeries& series, const FrequencyTrack& track,
+              const effects::Effect& effect, int step) {
     for (const char* name : {"cosine", "sine"}) {
         model.columns.push_back({.effect = &effect, .name = name});
         model.columns.back().step = step;
     }
-    set_line(model, model.columns.size() - 2, series, course);
+    set_line(model, model.columns.size() - 2, series, track);
 }
 
 }  // namespace ringlock::closure

@@ -38,9 +38,9 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
     };
     for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
         if (model.columns[k].name != "cosine") continue;
-        const LineCourse course = model.columns[k].course;
-        choose(course.hz, [&](SampleModel& there, const Alias& of) {
-            set_line(there, k, now.series(), course.shown_at(of.hz, of.folded));
+        const FrequencyTrack track = model.columns[k].track;
+        choose(track.hz, [&](SampleModel& there, const Alias& of) {
+            set_line(there, k, now.series(), track.shown_at(of.hz, of.folded));
         });
     }
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
@@ -108,14 +108,14 @@ double log_likelihood_of_shape(const SampleFit& now, const SampleNoise& noise) {
 /// The most likely place of the record's start in the source's interval, and the most likely share of errors of
 /// readings, which look like a white rate after interpolation.
 Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
-    constexpr int places = options.samples.screen.places_of_source;
+    constexpr int phases = options.samples.screen.phases_of_source;
     Resampled best{{}, -std::numeric_limits<double>::infinity()};
     const auto look_at = [&](SampleModel model) {
         const double value = log_likelihood_of_shape(now, model.noise);
         if (value > best.log_likelihood) best = {std::move(model), value};
     };
-    for (int place = 0; place < places; ++place) {
-        look_at(as_of(now, {from_hz, static_cast<double>(place) / places}, errors));
+    for (int place = 0; place < phases; ++place) {
+        look_at(as_of(now, {from_hz, static_cast<double>(place) / phases}, errors));
     }
     if (errors == Errors::of_readings) return best;
     for (int k = 0; k < options.samples.screen.most_error_steps; ++k) {
@@ -168,7 +168,7 @@ void screen_source(const SampleFit& now, const SampleContext& in, std::vector<Sa
     auto candidate = candidate_of(OnSamples::transport);
     if (!candidate) return;
     candidate->p_value = cycle.p_value;
-    candidate->searched = cycle.searched;
+    candidate->look_elsewhere = cycle.look_elsewhere;
     candidate->parameters = 2;
     candidate->freedom = 2;
     candidate->noise = SampleFit::Noise::free;
@@ -243,9 +243,9 @@ SampleModel without_source(const SampleFit& now) {
     const double rate_hz = now.series().rate_hz;
     for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
         if (model.columns[k].name != "cosine") continue;
-        const LineCourse course = model.columns[k].course;
-        const Alias shown = alias(course.hz, rate_hz);
-        set_line(model, k, now.series(), course.shown_at(shown.hz, shown.folded));
+        const FrequencyTrack track = model.columns[k].track;
+        const Alias shown = alias(track.hz, rate_hz);
+        set_line(model, k, now.series(), track.shown_at(shown.hz, shown.folded));
     }
     for (SampleNoise::Resonance& resonance : model.noise.resonances) resonance.hz = alias(resonance.hz, rate_hz).hz;
     model.noise.from_hz = model.noise.from_phase = 0.0;

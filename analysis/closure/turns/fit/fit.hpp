@@ -75,7 +75,7 @@ class TurnFit {
     /// Releases all memory of the length of the record. It is computed again from the parameters on demand, bit for
     /// bit, so of many fits only those in use need memory. Must not be called while others use references to these
     /// arrays.
-    void put_away() const;
+    void release() const;
 
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }
@@ -138,6 +138,9 @@ class TurnFit {
     Spread spread(const ActiveEffect& effect, const std::string& parameter, double most) const;
 
    private:
+    static constexpr std::size_t swing_columns = 3;  ///< of an oscillating amplitude: two amplitudes and the frequency
+    static constexpr std::size_t base_columns = 2;   ///< bias and threshold, after the nuisances
+
     TurnFit(const TurnFit& of, TurnParameters parameters, int passes);  ///< with the noise of these parameters
     static Score score_of(const Products& products);
     Score score_whitened(std::size_t count, const std::function<Eigen::VectorXd(std::size_t)>& column) const;
@@ -158,7 +161,7 @@ class TurnFit {
     /// objective.
     /// \return whether another step may gain
     bool go_down(const Equations& equations, const Whitening* guessed);
-    void climb();
+    void maximise();
     bool place_times();
     void fit_noise();
     void try_other_noise();
@@ -194,10 +197,10 @@ class TurnFit {
     Eigen::MatrixXd information(Eigen::VectorXd& scale) const;       ///< of the same columns, with the priors
     void add_noise_estimates(std::vector<Estimate>& estimates) const;
     /// Deviations of bias and threshold from their priors in standard deviations, and these standard deviations.
-    struct Belief {
+    struct Prior {
         double bias, threshold, bias_sd_deg_h, threshold_sd_deg_h;
     };
-    Belief belief_of(const TurnParameters& parameters) const;
+    Prior prior_of(const TurnParameters& parameters) const;
     void add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const;
     double objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
         return objective(prediction_.frame, parameters, rest);

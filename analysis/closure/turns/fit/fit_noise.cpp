@@ -26,16 +26,16 @@ constexpr const char* forgets_name = "amplitude_correlation_s";
 double square(double value) { return value * value; }
 
 /// A free parameter of the noise: a standard deviation, or another positive number, that is fitted by the likelihood.
-struct Knob {
+struct FreeParameter {
     std::string effect, name;
     double* value;
 };
 
 /// The readout's noise must be the third.
-std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
-    std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
-                          {"", "amplitude_wander_rad", &p.wander_sd_rad},
-                          {"", "readout_noise_rad", &p.readout_sd_rad}};
+std::vector<FreeParameter> free_parameters(TurnParameters& p, bool of_effects = true) {
+    std::vector<FreeParameter> all{{"", "injected_noise_rad", &p.injected_sd_rad},
+                                   {"", "amplitude_wander_rad", &p.wander_sd_rad},
+                                   {"", "readout_noise_rad", &p.readout_sd_rad}};
     if (p.wander_forgets > 0.0) all.push_back({"", forgets_name, &p.wander_forgets});
     if (!of_effects) return all;
     for (ActiveEffect& active : p.effects) {
@@ -183,7 +183,7 @@ void TurnFit::try_from(const TurnParameters& other) {
     const TurnParameters from = parameters_;
     parameters_ = other;
     fit_noise();
-    if (!(objective(parameters_, rest_) < before + options.turns.fit.summits_apart)) {
+    if (!(objective(parameters_, rest_) < before + options.turns.fit.maxima_apart)) {
         parameters_ = from;
         return;
     }
@@ -191,7 +191,7 @@ void TurnFit::try_from(const TurnParameters& other) {
     const TurnParameters columns_from = columns_at_;
     const TurnModel::Prediction prediction_from = prediction_;
     const bool moved_from = moved_;
-    climb();
+    maximise();
     if (objective(parameters_, rest_) < before) return;
     parameters_ = from;
     nuisance_ = nuisance_from;
@@ -249,7 +249,7 @@ void TurnFit::shape_noise() {
         parameters_.shape = std::move(shape);
         prediction_ = model_->predict(parameters_);
         moved_ = true;
-        climb();
+        maximise();
     }
 }
 
@@ -276,7 +276,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
                                       const std::vector<double>& rest) const {
     TurnParameters trial = start;
     const bool of_effects = effects_ == Effects::fitted;
-    const std::vector<Knob> turned = knobs(trial, of_effects);
+    const std::vector<FreeParameter> turned = free_parameters(trial, of_effects);
     const auto size = static_cast<Eigen::Index>(turned.size());
     Eigen::VectorXd from(size);
     for (Eigen::Index k = 0; k < size; ++k) {
@@ -285,8 +285,8 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     const auto with = [&](const Eigen::VectorXd& at) {
         TurnParameters changed = start;
         Eigen::Index k = 0;
-        for (const Knob& knob : knobs(changed, of_effects)) {
-            *knob.value = std::exp(std::clamp(at(k++), smallest_log, largest_log));
+        for (const FreeParameter& parameter : free_parameters(changed, of_effects)) {
+            *parameter.value = std::exp(std::clamp(at(k++), smallest_log, largest_log));
         }
         return changed;
     };
@@ -339,24 +339,24 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
 void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
     constexpr double seen = 0.1;  // of a standard error: the length of the differences
     TurnParameters trial = parameters_;
-    const std::vector<Knob> turned = knobs(trial);
+    const std::vector<FreeParameter> turned = free_parameters(trial);
     const Innovations here{innovations_, whitening_->sd_rad()};
-    const auto derivative = [&](const Knob& knob, double step) -> Eigen::VectorXd {
-        const double value = *knob.value;
-        *knob.value = std::sqrt(square(value) + step);
+    const auto derivative = [&](const FreeParameter& parameter, double step) -> Eigen::VectorXd {
+        const double value = *parameter.value;
+        *parameter.value = std::sqrt(square(value) + step);
         const Innovations moved(prediction_.frame, model_->noise(trial), rest_);
-        *knob.value = value;
+        *parameter.value = value;
         return here.change(moved, rows_) / step;
     };
     const auto size = static_cast<Eigen::Index>(turned.size());
     Eigen::MatrixXd derivatives(2 * rest_.size(), size);
     for (Eigen::Index k = 0; k < size; ++k) {
-        const Knob& knob = turned[static_cast<std::size_t>(k)];
-        double step = std::max(1e-2 * square(*knob.value), 1e-20);
-        derivatives.col(k) = derivative(knob, step);
+        const FreeParameter& parameter = turned[static_cast<std::size_t>(k)];
+        double step = std::max(1e-2 * square(*parameter.value), 1e-20);
+        derivatives.col(k) = derivative(parameter, step);
         for (int i = 0; i < 40 && !(step * derivatives.col(k).norm() > seen); ++i) {
             step *= 10.0;
-            derivatives.col(k) = derivative(knob, step);
+            derivatives.col(k) = derivative(parameter, step);
         }
     }
     Eigen::MatrixXd matrix = derivatives.transpose() * derivatives;

@@ -144,7 +144,7 @@ Eigen::VectorXd TurnFit::whitened(const Regressor& regressor) const {
     Eigen::VectorXd column = counted(*whitening_, prediction_.frame, regressor);
     const double all = column.norm();
     column -= own * (own.transpose() * column);
-    if (column.norm() < options.turns.fit.told_apart * all) column.setZero();
+    if (column.norm() < options.turns.fit.least_independent_share * all) column.setZero();
     return column;
 }
 
@@ -228,7 +228,7 @@ TurnFit::Products TurnFit::products(std::size_t count, const Piece& piece) const
     });
     found.squares = lower.selfadjointView<Eigen::Lower>();
     for (Eigen::Index k = 0; k < series; ++k) {
-        if (std::sqrt(found.squares(k, k)) >= options.turns.fit.told_apart * std::sqrt(all(k))) continue;
+        if (std::sqrt(found.squares(k, k)) >= options.turns.fit.least_independent_share * std::sqrt(all(k))) continue;
         found.squares.row(k).setZero();
         found.squares.col(k).setZero();
         found.right(k) = 0.0;

@@ -28,7 +28,7 @@ void linearise_again(Fitted& fitted, const Rows& rows, TurnFit::Effects effects)
     ReadingErrors known = fitted.fit->reading_errors();
     if (known.mean_rad.empty()) return;
     auto model = std::make_unique<TurnModel>(fitted.series(), fitted.joined().phase_rad, std::move(known));
-    fitted.fit->put_away();
+    fitted.fit->release();
     fitted.fit = std::make_unique<TurnFit>(*model, fitted.fit->parameters(), rows, effects);
     fitted.model = std::move(model);
 }
@@ -105,7 +105,7 @@ std::shared_ptr<Fitted> TurnProblem::fit(const TurnParameters& start, TurnFit::E
         // Injected noise shows in the swings. A fit that starts without it may end at a lower maximum.
         parameters.injected_sd_rad = injected_by_swings(fitted->series());
         if (parameters.injected_sd_rad > parameters.readout_sd_rad) {
-            fitted->fit->put_away();
+            fitted->fit->release();
             auto other = std::make_unique<TurnFit>(model, parameters, rows_, effects);
             if (other->log_likelihood() > fitted->log_likelihood()) fitted->fit = std::move(other);
         }

@@ -22,15 +22,15 @@ double cost_of_own_amplitudes(double gain, const effects::Effect& effect) {
 
 }  // namespace
 
-double promised_merit(const Candidate& candidate) {
+double predicted_evidence(const Candidate& candidate) {
     const double gain = 0.5 * candidate.chi2;
-    const int places = count_of(*candidate.effect, {effects::Role::time, effects::Role::frequency});
-    return gain - std::log(candidate.searched) - places - cost_of_own_amplitudes(gain, *candidate.effect);
+    const int positions = count_of(*candidate.effect, {effects::Role::time, effects::Role::frequency});
+    return gain - std::log(candidate.look_elsewhere) - positions - cost_of_own_amplitudes(gain, *candidate.effect);
 }
 
-double merit_of(double gain, const Fitted& fitted, const effects::Effect& effect) {
-    double merit = gain - cost_of_own_amplitudes(gain, effect);
-    if (count_of(effect, {effects::Role::time, effects::Role::frequency}) == 0) return merit;
+double evidence_of(double gain, const Fitted& fitted, const effects::Effect& effect) {
+    double evidence = gain - cost_of_own_amplitudes(gain, effect);
+    if (count_of(effect, {effects::Role::time, effects::Role::frequency}) == 0) return evidence;
     for (const Estimate& estimate : fitted.fit->estimates()) {
         if (estimate.effect != effect.name()) continue;
         for (const effects::Parameter& parameter : effect.parameters()) {
@@ -38,10 +38,10 @@ double merit_of(double gain, const Fitted& fitted, const effects::Effect& effect
             const double range = parameter.role == effects::Role::time        ? fitted.series().time_s.back()
                                  : parameter.role == effects::Role::frequency ? 0.5 / fitted.series().interval_s
                                                                               : 0.0;
-            if (range > 0.0) merit -= std::max(0.0, std::log(range / (std::sqrt(units::two_pi) * estimate.sd)));
+            if (range > 0.0) evidence -= std::max(0.0, std::log(range / (std::sqrt(units::two_pi) * estimate.sd)));
         }
     }
-    return merit;
+    return evidence;
 }
 
 double p_of_fit(const Fitted& fitted, const Fitted& without, const Candidate& candidate) {
@@ -50,7 +50,8 @@ double p_of_fit(const Fitted& fitted, const Fitted& without, const Candidate& ca
     const int amplitudes = count_of(*candidate.effect, {Role::size, Role::phase, Role::deviation, Role::probability});
     // Times and frequencies were searched. The look-elsewhere factor grows as the root of the maximum.
     const double higher = std::sqrt(std::max(1.0, chi2 / std::max(candidate.chi2, 1e-300)));
-    return of_several(chi2_tail(chi2, amplitudes), candidate.searched > 1.0 ? candidate.searched * higher : 1.0);
+    return of_several(chi2_tail(chi2, amplitudes),
+                      candidate.look_elsewhere > 1.0 ? candidate.look_elsewhere * higher : 1.0);
 }
 
 CandidateFit::CandidateFit(const TurnProblem& problem, const Fitted& now, const Candidate& candidate)
@@ -75,7 +76,7 @@ void CandidateFit::begin(const Fitted* alike, double needed) {
         anew(alike);
     }
     // The score's estimate is linear: if it lies too far away, shorter steps are tried.
-    const int shorter = told_by_other_columns(effect) ? 0 : limits.shorter_starts;
+    const int shorter = estimated_from_other_columns(effect) ? 0 : limits.shorter_starts;
     double share = 1.0;
     for (int k = 0; k < shorter && !gained(0.0); ++k) from(with_share(share *= 0.1));
 }
@@ -100,7 +101,7 @@ void CandidateFit::again_if_strong() {
 }
 
 void CandidateFit::from(const TurnParameters& start) {
-    if (best_) best_->fit->put_away();
+    if (best_) best_->fit->release();
     auto fitted = problem_.fit_or_none(start, needed_);
     if (!fitted) return;
     if (!best_ || fitted->log_likelihood() > best_->log_likelihood()) best_ = std::move(fitted);

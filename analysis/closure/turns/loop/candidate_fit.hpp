@@ -9,11 +9,11 @@ namespace ringlock::closure {
 
 /// Evidence that a score test predicts: gain of the log-likelihood less the cost of its parameters and of its search
 /// [nats].
-double promised_merit(const Candidate& candidate);
+double predicted_evidence(const Candidate& candidate);
 
 /// Evidence of an effect in a full fit [nats]: the gain of the log-likelihood with the amplitudes integrated out, and
 /// times and frequencies as well (Laplace), as the likelihood of a random rate has its path integrated out.
-double merit_of(double gain, const Fitted& fitted, const effects::Effect& effect);
+double evidence_of(double gain, const Fitted& fitted, const effects::Effect& effect);
 
 /// Probability by chance of the gain of a fit with the candidate over one without it, with the search over times and
 /// frequencies included.

@@ -19,11 +19,11 @@ struct CandidateSet {
     const Candidate* first = nullptr;
     std::vector<Candidate> others = {};
     std::shared_ptr<Fitted> fitted = {};
-    double merit = 0.0;
+    double evidence = 0.0;
     double p_value = 1.0;  ///< of the first, with the others in the model
 
     EffectSet effects() const {
-        EffectSet set{{first->effect}, merit};
+        EffectSet set{{first->effect}, evidence};
         for (const Candidate& candidate : others) set.effects.push_back(candidate.effect);
         return set;
     }
@@ -51,9 +51,9 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
         double p_value = first.p_value;
         if (alone != candidates.end()) p_value = p_of_fit(*both, *alone->fitted, first);
         if (!passes(p_value) || !passes(p_of_fit(*both, *first.fitted, second))) return;
-        const double merit = merit_of(gain_over(*both, *first.fitted), *both, *second.effect);
-        both->fit->put_away();
-        sets.push_back({&first, {second}, both, first.merit + merit - cost_of_choice(), p_value});
+        const double evidence = evidence_of(gain_over(*both, *first.fitted), *both, *second.effect);
+        both->fit->release();
+        sets.push_back({&first, {second}, both, first.evidence + evidence - cost_of_choice(), p_value});
     };
     std::vector<const Candidate*> firsts;
     std::vector<const Candidate*> random;
@@ -79,14 +79,14 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
     // One after the other: each ranking is parallel in itself, and holds a fit of the record meanwhile.
     for (std::size_t k = 0; k < firsts.size(); ++k) {
         seconds[k] = rank_candidates(problem, *firsts[k]->fitted, limits.second_of_pair, Among::not_random,
-                                     candidates.front().merit - firsts[k]->merit);
+                                     candidates.front().evidence - firsts[k]->evidence);
     }
     side_by_side(of_random.size(), [&](std::size_t k) {
         RatePair& pair = of_random[k];
         TurnParameters start = pair.first->fitted->parameters();
         start.effects.push_back(*pair.second->fitted->parameters().find(pair.second->effect->name()));
         pair.both = problem.fit_or_none(start);
-        if (pair.both) pair.both->fit->put_away();
+        if (pair.both) pair.both->fit->release();
     });
     for (std::size_t k = 0; k < firsts.size(); ++k) {
         if (seconds[k].seen_in_other_columns) continue;
@@ -104,7 +104,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
 std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<Candidate>& candidates,
                                   const std::vector<CandidateSet>& sets) {
     const TurnOptions::Loop& limits = options.turns.loop;
-    const double best = sets.front().merit;
+    const double best = sets.front().evidence;
     std::vector<const CandidateSet*> extended;
     for (const long random : {0L, 1L}) {
         const auto likeliest = std::find_if(sets.begin(), sets.end(), [&](const CandidateSet& set) {
@@ -119,18 +119,18 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
         // The residual of a pair with one random rate is searched after it has been added, except for effects that a
         // second random rate would hide.
         const bool may_win =
-            random == 0 ? likeliest->merit > limits.most_of_merit * best : !sets.front().others.empty();
+            random == 0 ? likeliest->evidence > limits.most_of_evidence * best : !sets.front().others.empty();
         if (may_win) extended.push_back(&*likeliest);
     }
     std::vector<std::vector<CandidateSet>> found(extended.size());
     for (std::size_t k = 0; k < extended.size(); ++k) {
         const CandidateSet& pair = *extended[k];
         const Ranking ranking =
-            rank_candidates(problem, *pair.fitted, limits.third_of_triple, Among::all, best - pair.merit);
+            rank_candidates(problem, *pair.fitted, limits.third_of_triple, Among::all, best - pair.evidence);
         if (ranking.seen_in_other_columns) continue;
         for (const Candidate& third : ranking.candidates) {
-            const double merit = pair.merit + third.merit - cost_of_choice();
-            if (!(merit > best - options.tie) || !passes(third.p_value)) continue;
+            const double evidence = pair.evidence + third.evidence - cost_of_choice();
+            if (!(evidence > best - options.tie) || !passes(third.p_value)) continue;
             const auto p_given_others = [&](const Candidate& candidate) {
                 TurnParameters without = third.fitted->parameters();
                 std::erase_if(without.effects,
@@ -140,7 +140,7 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
             };
             const double p_value = p_given_others(*pair.first);
             if (!passes(p_value) || !passes(p_given_others(pair.others.front()))) continue;
-            found[k].push_back({pair.first, {pair.others.front(), third}, third.fitted, merit, p_value});
+            found[k].push_back({pair.first, {pair.others.front(), third}, third.fitted, evidence, p_value});
         }
     }
     std::vector<CandidateSet> all;
@@ -158,11 +158,11 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
 std::vector<CandidateSet> sets_of(const TurnProblem& problem, const Ranking& ranking) {
     std::vector<CandidateSet> sets;
     for (const Candidate& candidate : ranking.candidates) {
-        sets.push_back({&candidate, {}, candidate.fitted, candidate.merit, candidate.p_value});
+        sets.push_back({&candidate, {}, candidate.fitted, candidate.evidence, candidate.p_value});
     }
     const auto sort = [&] {
         std::stable_sort(sets.begin(), sets.end(),
-                         [](const CandidateSet& a, const CandidateSet& b) { return a.merit > b.merit; });
+                         [](const CandidateSet& a, const CandidateSet& b) { return a.evidence > b.evidence; });
     };
     if (!ranking.seen_in_other_columns && is_random_rate(*ranking.candidates.front().effect)) {
         for (CandidateSet& pair : pairs(problem, ranking.candidates)) sets.push_back(std::move(pair));
@@ -174,11 +174,11 @@ std::vector<CandidateSet> sets_of(const TurnProblem& problem, const Ranking& ran
 }
 
 /// A deterministic rate may be more likely than the random rate that generated the record.
-void tie_random_rates(const Ranking& ranking, double merit, std::vector<const effects::Effect*>& tied) {
+void tie_random_rates(const Ranking& ranking, double evidence, std::vector<const effects::Effect*>& tied) {
     for (const Candidate& candidate : ranking.candidates) {
         const bool known = std::find(tied.begin(), tied.end(), candidate.effect) != tied.end();
         if (!is_random_rate(*candidate.effect) || known) continue;
-        if (candidate.merit > std::max(0.0, merit - options.tie_with_random)) tied.push_back(candidate.effect);
+        if (candidate.evidence > std::max(0.0, evidence - options.tie_with_random)) tied.push_back(candidate.effect);
     }
 }
 
@@ -192,7 +192,7 @@ Choice choose(const TurnProblem& problem, const Ranking& ranking) {
     const CandidateSet best = sets.front();
     std::vector<EffectSet> tied;
     for (const CandidateSet& set : sets) {
-        if (set.merit > best.merit - options.tie) tied.push_back(set.effects());
+        if (set.evidence > best.evidence - options.tie) tied.push_back(set.effects());
     }
     const auto alone = [&](const effects::Effect* effect) {
         return std::find_if(candidates.begin(), candidates.end(),
@@ -210,7 +210,7 @@ Choice choose(const TurnProblem& problem, const Ranking& ranking) {
     }
     const effects::Effect& chosen = *choice.chosen->effect;
     if (best.others.empty() && chosen.adds_angle() && !is_random_rate(chosen)) {
-        tie_random_rates(ranking, best.merit, choice.confounded_with);
+        tie_random_rates(ranking, best.evidence, choice.confounded_with);
     }
     return choice;
 }

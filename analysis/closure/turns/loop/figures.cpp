@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "analysis/closure/options.hpp"
-#include "analysis/closure/turns/loop/rivals.hpp"
+#include "analysis/closure/turns/loop/competing_tests.hpp"
 #include "analysis/closure/turns/screen/side_channels.hpp"
 
 namespace ringlock::closure {

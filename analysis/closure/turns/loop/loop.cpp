@@ -12,8 +12,8 @@
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/normality.hpp"
+#include "analysis/closure/turns/loop/competing_tests.hpp"
 #include "analysis/closure/turns/loop/figures.hpp"
-#include "analysis/closure/turns/loop/rivals.hpp"
 #include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/closure/turns/screen/dither_amplitude.hpp"
@@ -56,7 +56,7 @@ TurnLoop::TurnLoop(const record::Record& record, const Monitor& monitor)
 
 /// The previous fit releases its memory of the length of the record.
 void TurnLoop::go_on_with(std::shared_ptr<Fitted> fitted) {
-    if (now_ && now_ != fitted) now_->fit->put_away();
+    if (now_ && now_ != fitted) now_->fit->release();
     now_ = std::move(fitted);
 }
 
@@ -95,7 +95,8 @@ bool TurnLoop::add_amplitude(const Ranking& ranking, const Choice& choice) {
     auto amplitude = find_amplitude_swing(problem_, *now_);
     if (!amplitude) amplitude = find_amplitude_memory(problem_, *now_);
     if (!amplitude) return false;
-    if (choice.chosen != nullptr && !(amplitude->merit > choice.alternatives.front().merit - options.tie)) return false;
+    if (choice.chosen != nullptr && !(amplitude->evidence > choice.alternatives.front().evidence - options.tie))
+        return false;
     go_on_with(amplitude->fitted);
     if (closure_.steps.empty()) closure_.heldout_before = heldout(*now_->fit).error_rad;
     return true;
@@ -105,9 +106,9 @@ bool TurnLoop::add_amplitude(const Ranking& ranking, const Choice& choice) {
 bool TurnLoop::library_explains_most(Ranking& ranking, Choice& choice) const {
     if (ranking.seen_in_other_columns) return true;
     const TurnFit& fit = *now_->fit;
-    const auto merit = better_than_library(fit, choice);
-    if (!merit) return true;
-    if (!is_line_on_beat(fit, *choice.chosen)) return two_explain(problem_, choice, *merit);
+    const auto evidence = better_than_library(fit, choice);
+    if (!evidence) return true;
+    if (!is_line_on_beat(fit, *choice.chosen)) return two_explain(problem_, choice, *evidence);
     // A line on the beat follows the phase: an effect of the coupling by itself may explain it.
     std::erase_if(ranking.candidates,
                   [&](const Candidate& c) { return is_line_on_beat(fit, c) || is_random_rate(*c.effect); });
@@ -121,7 +122,7 @@ bool TurnLoop::library_explains_most(Ranking& ranking, Choice& choice) const {
 bool TurnLoop::add_one() {
     check_interrupt();
     monitor_.tell("searching the library");
-    Ranking ranking = rank_candidates(problem_, *now_, options.most_contenders);
+    Ranking ranking = rank_candidates(problem_, *now_, options.most_finalists);
     Choice choice = choose(problem_, ranking);
     if (add_amplitude(ranking, choice)) return true;
     if (choice.chosen == nullptr || !library_explains_most(ranking, choice)) return false;
@@ -170,7 +171,7 @@ void TurnLoop::read_shape_again() {
     for (int pass = 0; pass < options.turns.loop.shape_readings; ++pass) {
         const auto shape = shape_read_again(problem_.turns(), *now_->fit);
         if (!shape) return;
-        now_->fit->put_away();
+        now_->fit->release();
         auto fitted = problem_.fit_or_none(*shape);
         if (!fitted) return;
         go_on_with(std::move(fitted));
@@ -182,7 +183,7 @@ void TurnLoop::drop_needless() {
     for (std::size_t k = closure_.steps.size(); k-- > 0;) {
         const effects::Effect* effect = closure_.steps[k].effect;
         if (changes_reading(*effect)) continue;
-        const bool shape = told_by_other_columns(*effect);
+        const bool shape = estimated_from_other_columns(*effect);
         if (shape) {
             const auto screened = screen_side_channels(problem_.turns(), *now_->fit, now_->joined(), true);
             const auto same =
@@ -191,7 +192,7 @@ void TurnLoop::drop_needless() {
         }
         TurnParameters without = now_->parameters();
         std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
-        now_->fit->put_away();
+        now_->fit->release();
         auto fitted = problem_.fit_or_none(without);
         if (!fitted) continue;
         if (!shape && passes(p_of_gain(gain_over(*now_, *fitted), *effect))) continue;
@@ -218,7 +219,7 @@ void TurnLoop::take_back_random() {
     closure_.steps = std::move(earlier_->steps);
     test_residual();
     const auto same = std::find_if(closure_.tests.begin(), closure_.tests.end(),
-                                   [&](const ResidualTest& test) { return test.view == with_random.view; });
+                                   [&](const ResidualTest& test) { return test.subject == with_random.subject; });
     closure_.unexplained = same == closure_.tests.end() ? with_random : *same;
 }
 
@@ -249,7 +250,7 @@ void TurnLoop::finish() {
     }
     closure_.log_likelihood_gain = now_->log_likelihood() - base_log_likelihood_;
     take_residual(problem_.turns(), *now_, closure_);
-    now_->fit->put_away();
+    now_->fit->release();
     monitor_.tell("fitting the whole record");
     const TurnProblem whole = problem_.whole();
     take_figures(problem_.turns(), *whole.fit(now_->parameters()), closure_);

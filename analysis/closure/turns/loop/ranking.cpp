@@ -41,7 +41,7 @@ std::vector<Candidate> screen_by_any_noise(const TurnFit& fit) {
 std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double largest_p, std::size_t most) {
     std::erase_if(candidates, [&](const Candidate& c) { return !(c.p_value < largest_p); });
     std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return promised_merit(a) > promised_merit(b); });
+              [](const Candidate& a, const Candidate& b) { return predicted_evidence(a) > predicted_evidence(b); });
     const std::vector<Candidate> all = candidates;
     std::size_t taken = 0;
     std::erase_if(candidates, [&](const Candidate& c) {
@@ -71,7 +71,7 @@ class RankingFits {
                 double matters)
         : now_(now), candidates_(candidates), other_columns_(other_columns), matters_(matters) {
         for (const Candidate& candidate : candidates) fits_.emplace_back(problem, now, candidate);
-        merits_.resize(candidates.size());
+        evidences_.resize(candidates.size());
     }
 
     void fit_all() {
@@ -93,13 +93,13 @@ class RankingFits {
         fit(others, random == nullptr ? nullptr : fits_[first_random].best().get());
         fit(larger, nullptr);
         side_by_side(fits_.size(), [&](std::size_t k) {
-            if (!fits_[k].best() || merits_[k] < options.turns.loop.nearly_best * matters_) return;
+            if (!fits_[k].best() || evidences_[k] < options.turns.loop.nearly_best * matters_) return;
             fits_[k].again_if_strong();
             judge(k);
         });
         for (std::size_t k = 0; k < candidates_.size(); ++k) {
             candidates_[k].fitted = fits_[k].best();
-            candidates_[k].merit = merits_[k];
+            candidates_[k].evidence = evidences_[k];
             if (fits_[k].best() && !other_columns_) {
                 candidates_[k].p_value = p_of_fit(*fits_[k].best(), now_, candidates_[k]);
             }
@@ -110,7 +110,7 @@ class RankingFits {
     void fit(const std::vector<std::size_t>& some, const Fitted* alike) {
         const TurnOptions::Loop& limits = options.turns.loop;
         const double needed =
-            matters_ > limits.much_merit ? limits.far_below * matters_ : -std::numeric_limits<double>::infinity();
+            matters_ > limits.much_evidence ? limits.far_below * matters_ : -std::numeric_limits<double>::infinity();
         side_by_side(some.size(), [&](std::size_t i) {
             const std::size_t k = some[i];
             const std::optional<std::size_t> smaller = contained_in(k);
@@ -122,7 +122,7 @@ class RankingFits {
             judge(k);
         });
         for (const std::size_t k : some) {
-            if (fits_[k].best()) matters_ = std::max(matters_, merits_[k]);
+            if (fits_[k].best()) matters_ = std::max(matters_, evidences_[k]);
         }
     }
     /// Another candidate that this one contains.
@@ -136,10 +136,10 @@ class RankingFits {
         const auto& best = fits_[k].best();
         if (!best) return;
         const Candidate& candidate = candidates_[k];
-        merits_[k] =
-            other_columns_ ? promised_merit(candidate) : merit_of(gain_over(*best, now_), *best, *candidate.effect);
+        evidences_[k] = other_columns_ ? predicted_evidence(candidate)
+                                       : evidence_of(gain_over(*best, now_), *best, *candidate.effect);
         if (!other_columns_ && contained_in(k)) best->fit->estimates();  // needed when all are fitted
-        best->fit->put_away();
+        best->fit->release();
     }
 
     const Fitted& now_;
@@ -147,7 +147,7 @@ class RankingFits {
     bool other_columns_;
     double matters_;
     std::vector<CandidateFit> fits_;
-    std::vector<double> merits_;
+    std::vector<double> evidences_;
 };
 
 /// An effect that contains another one is as likely as that one, except for the evidence on its additional sizes.
@@ -158,7 +158,7 @@ void compare_with_contained(std::vector<Candidate>& candidates) {
             const auto evidence =
                 evidence_for_addition(*larger.effect, *smaller.effect, larger.fitted->fit->estimates(),
                                       gain_over(*larger.fitted, *smaller.fitted));
-            if (evidence) larger.merit = smaller.merit + *evidence;
+            if (evidence) larger.evidence = smaller.evidence + *evidence;
         }
     }
 }
@@ -185,12 +185,12 @@ Ranking rank_candidates(const TurnProblem& problem, const Fitted& now, std::size
         }
         candidates = worth_a_fit(std::move(candidates), options.turns.loop.worth_a_fit_p, most);
     }
-    now.fit->put_away();
+    now.fit->release();
     RankingFits(problem, now, candidates, ranking.seen_in_other_columns, matters).fit_all();
     std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.fitted; });
     if (!ranking.seen_in_other_columns) compare_with_contained(candidates);
     std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
+              [](const Candidate& a, const Candidate& b) { return a.evidence > b.evidence; });
     return ranking;
 }
 

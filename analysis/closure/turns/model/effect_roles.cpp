@@ -55,9 +55,15 @@ EffectRoles find_roles() {
 
 }  // namespace
 
-bool told_by_other_columns(const Effect& effect) {
+bool estimated_from_other_columns(const Effect& effect) {
     const Configures configures = configured_by(effect);
     return configures.dither_shape || configures.reading;
+}
+
+bool is_fitted_in_phase(const effects::Effect& effect, effects::Role role) {
+    using effects::Role;
+    return (role == Role::size || role == Role::phase || role == Role::time || role == Role::frequency) &&
+           !estimated_from_other_columns(effect);
 }
 
 bool changes_reading(const Effect& effect) { return configured_by(effect).reading; }

@@ -12,7 +12,11 @@ namespace ringlock::closure {
 
 /// Whether times, accelerations, the quadrature circle or the counter show the effect without the phases: the dither's
 /// shape, the detectors, the counter.
-bool told_by_other_columns(const effects::Effect& effect);
+bool estimated_from_other_columns(const effects::Effect& effect);
+
+/// Whether parameters with this role are fitted to the phases. Those that other columns determine
+/// (side_channels.hpp) are held.
+bool is_fitted_in_phase(const effects::Effect& effect, effects::Role role);
 
 /// Whether the effect changes the phases as they are read: the detectors or the counter. The record is then read again.
 bool changes_reading(const effects::Effect& effect);

@@ -73,12 +73,12 @@ class Follower {
 /// Covariance of the filter's state, turn by turn. Since all states except the angle are independent, a step takes
 /// states^2 operations.
 template <std::size_t states, class Tag>
-class Belief {
+class Prior {
    public:
     using V = decltype(set(Tag{}, 0.0));
     using Row = std::array<V, states>;
 
-    Belief(const FilterNoises& of, std::size_t first)
+    Prior(const FilterNoises& of, std::size_t first)
         : injected_(load(d_, &of.injected_rad2[first])), readout_(load(d_, &of.readout_rad2[first])) {
         for (std::size_t s = 0; s < states; ++s) {
             const std::size_t at = s * of.row + first;
@@ -136,12 +136,12 @@ class Belief {
 
 template <std::size_t states>
 void gains_with(const TurnFrame& frame, const FilterNoises& noises, double* gains, double* sd) {
-    Belief<states, One> belief(noises, 0);
-    typename Belief<states, One>::Row gain;
+    Prior<states, One> prior(noises, 0);
+    typename Prior<states, One>::Row gain;
     for (std::size_t i = 0; i < frame.sign.size(); ++i) {
         double f = 0.0;
         double over = 0.0;
-        belief.step(frame, i, gain, f, over);
+        prior.step(frame, i, gain, f, over);
         for (std::size_t s = 0; s < states; ++s) gains[i * states + s] = gain[s] * over;
         sd[i] = std::sqrt(f);
     }
@@ -166,13 +166,13 @@ void innovations_with(const TurnFrame& frame, const FilterNoises& noises, const 
 template <std::size_t states>
 void innovations_once_with(const TurnFrame& frame, const FilterNoises& noises, const double* series,
                            double* innovations, double* sd) {
-    Belief<states, One> belief(noises, 0);
+    Prior<states, One> prior(noises, 0);
     Follower<states, One> follower(noises, 0);
-    typename Belief<states, One>::Row gain;
+    typename Prior<states, One>::Row gain;
     for (std::size_t i = 0; i < frame.sign.size(); ++i) {
         double f = 0.0;
         double over = 0.0;
-        belief.step(frame, i, gain, f, over);
+        prior.step(frame, i, gain, f, over);
         for (std::size_t s = 0; s < states; ++s) gain[s] = gain[s] * over;
         sd[i] = std::sqrt(f);
         const double innovation = follower.innovation(series[i], frame.sign[i]);
@@ -184,7 +184,7 @@ void innovations_once_with(const TurnFrame& frame, const FilterNoises& noises, c
 template <std::size_t states, class Tag>
 void likelihoods_with(Tag d, const TurnFrame& frame, const FilterNoises& noises, std::size_t first,
                       const double* series, const std::uint8_t* counts, double* sums) {
-    using V = typename Belief<states, Tag>::V;
+    using V = typename Prior<states, Tag>::V;
     // Logarithms take most of the time. They are taken of products of a few variances, which stay within the range of
     // doubles.
     constexpr int at_once = 8;
@@ -194,16 +194,16 @@ void likelihoods_with(Tag d, const TurnFrame& frame, const FilterNoises& noises,
         store(d, product, products);
         for (std::size_t k = 0; k < width(d); ++k) of_products[k] += 0.5 * std::log(products[k]);
     };
-    Belief<states, Tag> belief(noises, first);
+    Prior<states, Tag> prior(noises, first);
     Follower<states, Tag> follower(noises, first);
-    typename Belief<states, Tag>::Row gain;
+    typename Prior<states, Tag>::Row gain;
     V sum = set(d, 0.0);
     V product = set(d, 1.0);
     int multiplied = 0;
     for (std::size_t i = 0; i < frame.sign.size(); ++i) {
         V f, over;
         const V innovation = follower.innovation(series[i], frame.sign[i]);
-        belief.step(frame, i, gain, f, over);
+        prior.step(frame, i, gain, f, over);
         const V scaled = innovation * over;
         if (counts[i] != 0) {
             sum = sum + innovation * scaled;

@@ -345,18 +345,18 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     prediction.dither_s = smooth(prediction.turn_s);
     if (const auto added_deg_h = added_rates_deg_h(parameters, prediction.dither_s); !added_deg_h.empty()) {
         double most_deg_h = 0.0;
-        std::vector<double> beside_bias_deg_h = series_.input_rate_deg_h;
+        std::vector<double> with_bias_deg_h = series_.input_rate_deg_h;
         for (std::size_t i = 0; i < n; ++i) {
             rate_deg_h[i] += added_deg_h[i];
-            beside_bias_deg_h[i] += added_deg_h[i];
+            with_bias_deg_h[i] += added_deg_h[i];
             most_deg_h = std::max(most_deg_h, std::abs(added_deg_h[i]));
         }
         // Shift of the zero-rate points over the time within which the phase turns: the relative change of a kick.
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
         if (c * most_deg_h > options.turns.model.rate_felt_by_kicks * std::sqrt(acceleration_rad_s2)) {
             kick_of =
-                std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, coupling, parameters.shape));
-            swing = dither_swings(*kick_of, beside_bias_deg_h);
+                std::make_shared<const Kicks>(kicks_at(device_setup, with_bias_deg_h, coupling, parameters.shape));
+            swing = dither_swings(*kick_of, with_bias_deg_h);
         }
         prediction.turn_s = dither_turns(rate_deg_h, coupling, swing, device);
         prediction.dither_s = smooth(prediction.turn_s);

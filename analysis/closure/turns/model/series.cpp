@@ -75,7 +75,7 @@ std::vector<std::int64_t> lost_quarters(const CountedQuarters& counted) {
         const double log_likelihood = chain.log_likelihood(p);
         if (!(log_likelihood > likeliest)) continue;
         likeliest = log_likelihood;
-        lost = chain.likeliest_course(p);
+        lost = chain.likeliest_path(p);
     }
     const std::int64_t whole = lost.front() > 2 ? 4 : 0;
     for (std::int64_t& quarters : lost) quarters -= whole;

@@ -49,7 +49,7 @@ std::vector<State> states_of(const TurnNoise& noise, bool walks, double dt) {
     return states;
 }
 
-FilterNoises beside(std::span<const TurnNoise> noises, double dt) {
+FilterNoises filter_noises(std::span<const TurnNoise> noises, double dt) {
     const bool walks =
         std::any_of(noises.begin(), noises.end(), [](const TurnNoise& n) { return n.walk_rad2_per_s3 > 0.0; });
     const std::size_t states = states_of(noises.front(), walks, dt).size();
@@ -75,7 +75,7 @@ FilterNoises beside(std::span<const TurnNoise> noises, double dt) {
 }  // namespace
 
 Whitening::Whitening(const TurnFrame& frame, const TurnNoise& noise)
-    : frame_(frame), noises_(beside({&noise, 1}, frame.interval_s)) {
+    : frame_(frame), noises_(filter_noises({&noise, 1}, frame.interval_s)) {
     gains_.resize(frame.sign.size() * noises_.states);
     sd_.resize(frame.sign.size());
     filter_gains(frame, noises_, gains_, sd_);
@@ -93,7 +93,7 @@ std::vector<double> Whitening::minus_log_likelihoods(const TurnFrame& frame, std
     std::vector<double> all(noises.size());
     side_by_side((noises.size() + at_once - 1) / at_once, [&](std::size_t part) {
         const auto some = noises.subspan(part * at_once, std::min(at_once, noises.size() - part * at_once));
-        const auto found = filter_likelihoods(frame, beside(some, frame.interval_s), series, counts);
+        const auto found = filter_likelihoods(frame, filter_noises(some, frame.interval_s), series, counts);
         std::copy(found.begin(), found.end(), all.begin() + static_cast<std::ptrdiff_t>(part * at_once));
     });
     return all;
@@ -113,7 +113,7 @@ void Whitening::apply(std::size_t first, std::span<double> part, FilterState& st
 Whitening::Innovations Whitening::innovations(const TurnFrame& frame, const TurnNoise& noise,
                                               std::span<const double> series) {
     Innovations of{std::vector<double>(series.size()), std::vector<double>(series.size())};
-    filter_innovations_once(frame, beside({&noise, 1}, frame.interval_s), series, of.white, of.sd_rad);
+    filter_innovations_once(frame, filter_noises({&noise, 1}, frame.interval_s), series, of.white, of.sd_rad);
     return of;
 }
 
@@ -144,14 +144,14 @@ ReadingErrors Whitening::reading_errors(std::span<const double> series) const {
         const double through = 1.0 - frame_.before_slope[i];
         const double kick = frame_.kick_slope[i];
         const double over = 1.0 / (sd_[i] * sd_[i]);
-        const double told = innovations[i] / sd_[i] - gain.dot(after);
+        const double smoothing_error = innovations[i] / sd_[i] - gain.dot(after);
         const Vector weighed = weight * gain;
-        errors.mean_rad[i] = readout * (through * told - kick * after(0));
+        errors.mean_rad[i] = readout * (through * smoothing_error - kick * after(0));
         errors.variance_rad2[i] = readout - readout * readout *
                                                 (through * through * (over + gain.dot(weighed)) +
                                                  kick * kick * weight(0, 0) + 2.0 * through * kick * weighed(0));
         const Matrix on = step - gain * seen.transpose();
-        after = (seen * told + step.transpose() * after).eval();
+        after = (seen * smoothing_error + step.transpose() * after).eval();
         weight = (over * seen * seen.transpose() + on.transpose() * weight * on).eval();
     }
     return errors;

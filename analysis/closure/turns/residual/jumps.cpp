@@ -38,7 +38,7 @@ std::vector<double> two_level_angle(const std::vector<double>& time, const std::
 struct Jumping {
     std::vector<double> jumps;  ///< [s], in order
     double on = 0.0;            ///< the first level: one or zero
-    double merit = -std::numeric_limits<double>::infinity();
+    double evidence = -std::numeric_limits<double>::infinity();
     TurnParameters noise = {};  ///< noise with the jumps in the model
 
     std::vector<double> angle(const TurnFit& fit) const {
@@ -79,8 +79,8 @@ void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
     const double place =
         std::log(static_cast<double>(options.turns.jumps.stretches - 1)) + options.turns.jumps.cost_of_place;
     TurnFit::Regression regression = fit.regress({jumping.angle(fit)}, near);
-    jumping.merit = regression.gain - cost_of_amplitudes(regression.gain, 1) - of_levels -
-                    place * static_cast<double>(jumping.jumps.size());
+    jumping.evidence = regression.gain - cost_of_amplitudes(regression.gain, 1) - of_levels -
+                       place * static_cast<double>(jumping.jumps.size());
     jumping.noise = std::move(regression.noise);
 }
 
@@ -103,9 +103,9 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
                 values[i] = time[first + i] > found.jumps[k - 1] ? late : 0.0;
         };
         const Eigen::VectorXd value = fit.with_noise(found.noise)->score_pieces(found.jumps.size() + 1, piece).value;
-        const double before = found.merit;
+        const double before = found.evidence;
         // A full step is too long where jumps are near each other.
-        for (double share = 1.0; share > of.least_share_of_move && !(found.merit > before); share *= 0.5) {
+        for (double share = 1.0; share > of.least_share_of_move && !(found.evidence > before); share *= 0.5) {
             Jumping moved{.jumps = found.jumps, .on = found.on};
             for (std::size_t k = 0; k < moved.jumps.size(); ++k) {
                 moved.jumps[k] += share * value(static_cast<Eigen::Index>(k) + 1) / value(0);
@@ -113,9 +113,9 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
             if (!std::is_sorted(moved.jumps.begin(), moved.jumps.end())) continue;
             if (!(moved.jumps.front() > 0.0 && moved.jumps.back() < time.back())) continue;
             judge(fit, moved, found.noise);
-            if (moved.merit > found.merit) found = std::move(moved);
+            if (moved.evidence > found.evidence) found = std::move(moved);
         }
-        if (found.merit < before + std::max(of.gained, of.gained_of_merit * before)) break;
+        if (found.evidence < before + std::max(of.gained, of.gained_of_evidence * before)) break;
     }
 }
 
@@ -128,9 +128,10 @@ Jumping without_stay(const Jumping& all, std::size_t k) {
 
 /// Stays by how much they explain under the present noise, the least first.
 std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
-    const auto beside = fit.with_noise(all.noise);
+    const auto with_their = fit.with_noise(all.noise);
     std::vector<double> left(all.jumps.size() - 1);
-    side_by_side(left.size(), [&](std::size_t k) { left[k] = beside->score({without_stay(all, k).angle(fit)}).chi2; });
+    side_by_side(left.size(),
+                 [&](std::size_t k) { left[k] = with_their->score({without_stay(all, k).angle(fit)}).chi2; });
     std::vector<std::size_t> order(left.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return left[a] > left[b]; });
@@ -145,15 +146,16 @@ bool drop_some(const TurnFit& fit, Jumping& found) {
     const std::vector<std::size_t> order = stays_by_use(fit, found);
     const auto better = [&](Jumping without) {
         judge(fit, without, found.noise);
-        if (!(without.merit > found.merit)) return false;
+        if (!(without.evidence > found.evidence)) return false;
         found = std::move(without);
         return true;
     };
     for (std::size_t most = found.jumps.size() / 2 - 1; most > 1; most /= 2) {
         std::vector<std::size_t> dropped;  // stays that share no jump
         for (const std::size_t k : order) {
-            const auto beside_it = [&](std::size_t other) { return other + 1 >= k && other <= k + 1; };
-            if (dropped.size() < most && std::none_of(dropped.begin(), dropped.end(), beside_it)) dropped.push_back(k);
+            const auto is_adjacent = [&](std::size_t other) { return other + 1 >= k && other <= k + 1; };
+            if (dropped.size() < most && std::none_of(dropped.begin(), dropped.end(), is_adjacent))
+                dropped.push_back(k);
         }
         std::sort(dropped.rbegin(), dropped.rend());
         Jumping without{.jumps = found.jumps, .on = found.on};
@@ -194,22 +196,22 @@ TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches) {
 
 std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels) { return placed(fit, levels).angle(fit); }
 
-double merit_of_jumps(const TurnFit& fit, const TwoLevels& levels, double rival) {
+double evidence_of_jumps(const TurnFit& fit, const TwoLevels& levels, double competing) {
     const TurnOptions::Jumps& of = options.turns.jumps;
     Jumping best = placed(fit, levels);
     judge(fit, best, fit.parameters());
-    if (best.merit < of.near_rival * rival) return best.merit;
+    if (best.evidence < of.near_competing * competing) return best.evidence;
     const TurnParameters noise = best.noise;
     best = with_their_noise(fit, std::move(best), noise);
     for (int pass = 0; pass < of.most_searches; ++pass) {
-        const auto beside = fit.with_noise(best.noise);
-        const TwoLevels again = levels_of_stretches(*beside, of.finer * of.stretches);
+        const auto with_their = fit.with_noise(best.noise);
+        const TwoLevels again = levels_of_stretches(*with_their, of.finer * of.stretches);
         if (again.changes == 0) break;
-        Jumping other = with_their_noise(fit, placed(*beside, again), best.noise);
-        if (!(other.merit > best.merit)) break;
+        Jumping other = with_their_noise(fit, placed(*with_their, again), best.noise);
+        if (!(other.evidence > best.evidence)) break;
         best = std::move(other);
     }
-    return best.merit;
+    return best.evidence;
 }
 
 }  // namespace ringlock::closure

@@ -17,8 +17,8 @@ TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches = option
 std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels);
 
 /// Evidence of jumps under the noise that remains with them in the model. If jumps were most of the noise, short stays
-/// show only then. This is searched only if jumps come near the evidence `rival` at first: of a true random rate they
-/// explain far less, and there are many.
-double merit_of_jumps(const TurnFit& fit, const TwoLevels& levels, double rival);
+/// show only then. This is searched only if jumps come near the evidence `competing` at first: of a true random rate
+/// they explain far less, and there are many.
+double evidence_of_jumps(const TurnFit& fit, const TwoLevels& levels, double competing);
 
 }  // namespace ringlock::closure

@@ -74,7 +74,7 @@ ResidualTest size_over_phase(const TurnFit& fit) {
     const TurnKicks kicks = fit.model().mean_kicks(fit.parameters());
     std::vector<double> size(n);
     std::vector<double> sd_rad(n);  // without the phase that the lock-in adds before the turn
-    std::vector<double> foretold(n);
+    std::vector<double> predicted(n);
     double mean_size = 0.0;
     double mean_sd_rad = 0.0;
     double counted = 0.0;
@@ -83,7 +83,7 @@ ResidualTest size_over_phase(const TurnFit& fit) {
         size[i] = size_deviate(std::abs(e[i]) / sd);
         const TurnKicks::Kick kick = kicks.at(series.direction[i], phase[i]);
         sd_rad[i] = fit.sd_rad()[i] * std::abs(1.0 - fit.prediction().frame.before_slope[i]);
-        foretold[i] = phase[i] - kick.before_rad - sd_rad[i] * e[i];
+        predicted[i] = phase[i] - kick.before_rad - sd_rad[i] * e[i];
         mean_size += size[i];
         mean_sd_rad += sd_rad[i];
         counted += 1.0;
@@ -99,7 +99,7 @@ ResidualTest size_over_phase(const TurnFit& fit) {
         if (!rows[i]) continue;
         const int direction = series.direction[i];
         const Harmonics more =
-            harmonics_of(phase[i]) * (size[i] - mean_size) - (direction > 0 ? at_minima : at_maxima).at(foretold[i]);
+            harmonics_of(phase[i]) * (size[i] - mean_size) - (direction > 0 ? at_minima : at_maxima).at(predicted[i]);
         Eigen::VectorXd row(columns);
         row << more, static_cast<double>(direction) * more;
         right += row;

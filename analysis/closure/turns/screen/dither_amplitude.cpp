@@ -67,15 +67,15 @@ std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, c
         chi2 = score.chi2;
         swing = {hz, score.value(0), score.value(1)};
     }
-    const double places = std::max(1.0, of.places_per_bin * 2.0 * band_hz * series.time_s.back());
-    if (!passes(of_several(chi2_tail(chi2, 2), places))) return std::nullopt;
+    const double trials = std::max(1.0, of.trials_per_bin * 2.0 * band_hz * series.time_s.back());
+    if (!passes(of_several(chi2_tail(chi2, 2), trials))) return std::nullopt;
     with.swings.push_back(swing);
     AmplitudeModel found;
     found.fitted = problem.fit_or_none(with);
     if (!found.fitted) return std::nullopt;
     const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
-    if (!passes(of_several(chi2_tail(2.0 * gain, 2), places))) return std::nullopt;
-    found.merit = gain - cost_of_amplitudes(gain, 2) - std::log(places) - of.cost_of_frequency;
+    if (!passes(of_several(chi2_tail(2.0 * gain, 2), trials))) return std::nullopt;
+    found.evidence = gain - cost_of_amplitudes(gain, 2) - std::log(trials) - of.cost_of_frequency;
     return found;
 }
 
@@ -99,7 +99,7 @@ std::optional<AmplitudeModel> find_amplitude_memory(const TurnProblem& problem, 
     if (!found.fitted) return std::nullopt;
     const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
     if (!passes(chi2_tail(2.0 * gain, 1))) return std::nullopt;
-    found.merit = gain - cost_of_amplitudes(gain, 1);
+    found.evidence = gain - cost_of_amplitudes(gain, 1);
     return found;
 }
 

@@ -122,15 +122,15 @@ class PhaseFunctions {
     }
     /// Mean square over all phases of the function with these coefficients: at minima, at maxima.
     static std::array<double, 2> mean_squares(const Eigen::VectorXd& coefficients) {
-        constexpr int places = 16;  // in each cell
+        constexpr int trials = 16;  // in each cell
         std::array<double, 2> sums{};
         Eigen::VectorXd row(columns);
         for (Eigen::Index cell = 0; cell < 2 * cells; ++cell) {
-            for (int k = 0; k < places; ++k) {
+            for (int k = 0; k < trials; ++k) {
                 row.setZero();
-                add(cell * powers, std::sqrt((k + 0.5) / places), 1.0, row);
+                add(cell * powers, std::sqrt((k + 0.5) / trials), 1.0, row);
                 const double value = coefficients.dot(row);
-                sums[static_cast<std::size_t>(cell / cells)] += value * value / (cells * places);
+                sums[static_cast<std::size_t>(cell / cells)] += value * value / (cells * trials);
             }
         }
         return sums;

@@ -119,7 +119,7 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     if (amplitudes.empty()) return std::nullopt;
     const std::string time = name_of(*first_of(effect, Role::time));
     const double end = fit.model().series().time_s.back();
-    constexpr int places = options.turns.score_tests.times;
+    constexpr int positions = options.turns.score_tests.times;
     constexpr int finer = options.turns.score_tests.refined_times;
     /// Root of the chi-squared of all amplitudes together, with the sign of a single one; zero if the record does not
     /// distinguish them from each other or from the model.
@@ -156,17 +156,17 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
         return roots;
     };
     std::vector<double> times;
-    for (int k = 1; k < places; ++k) times.push_back(end * k / places);
+    for (int k = 1; k < positions; ++k) times.push_back(end * k / positions);
     const std::vector<double> roots = consider(times);
     const double centre = candidate.values.at(time);
     times.clear();
     for (int k = 1 - finer; k < finer; ++k) {
-        if (k != 0) times.push_back(centre + end / places * k / finer);
+        if (k != 0) times.push_back(centre + end / positions * k / finer);
     }
     consider(times);
     candidate.chi2 = best * best;
     candidate.p_value = davies_bound(candidate.chi2, roots, freedom);
-    candidate.searched = davies_places(candidate.chi2, roots);
+    candidate.look_elsewhere = davies_look_elsewhere(candidate.chi2, roots);
     return candidate;
 }
 
@@ -242,23 +242,23 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     std::sort(peaks.begin(), peaks.end(),
               [&](std::size_t a, std::size_t b) { return std::norm(out[a]) > std::norm(out[b]); });
     if (peaks.size() > of.peaks) peaks.resize(of.peaks);
-    std::vector<double> places;
+    std::vector<double> frequencies_hz;
     for (std::size_t k = 0; k < peaks.size(); ++k) {
-        places.push_back(static_cast<double>(peaks[k]) * bin_hz);
+        frequencies_hz.push_back(static_cast<double>(peaks[k]) * bin_hz);
         if (k >= of.peaks_with_images) continue;
-        for (const double hz : seen_by_beat(fit.model(), places.back())) {
-            if (band.has(hz)) places.push_back(hz);
+        for (const double hz : seen_by_beat(fit.model(), frequencies_hz.back())) {
+            if (band.has(hz)) frequencies_hz.push_back(hz);
         }
     }
-    if (places.empty()) return std::nullopt;
+    if (frequencies_hz.empty()) return std::nullopt;
     Candidate best{&effect, values_at_rest(effect)};
-    for (const double hz : places) keep_better(best, at_frequency(fit, without, effect, hz));
+    for (const double hz : frequencies_hz) keep_better(best, at_frequency(fit, without, effect, hz));
     const double centre = best.values.at(name_of(*first_of(effect, Role::frequency)));
     for (const double off : {-1.0, -0.5, 0.5, 1.0}) {
         keep_better(best, at_frequency(fit, without, effect, centre + off * bin_hz));
     }
-    best.searched = places_of_frequency(best.chi2, 0.5 * static_cast<double>(n));
-    best.p_value = of_several(chi2_tail(best.chi2, 2), best.searched);
+    best.look_elsewhere = look_elsewhere_of_frequency(best.chi2, 0.5 * static_cast<double>(n));
+    best.p_value = of_several(chi2_tail(best.chi2, 2), best.look_elsewhere);
     return best;
 }
 
@@ -315,7 +315,7 @@ std::vector<Candidate> screen(const TurnFit& fit) {
     std::vector<std::optional<Candidate>> found(registry.size());
     side_by_side(registry.size(), [&](std::size_t k) {
         const Effect* effect = registry[k];
-        if (fit.parameters().find(effect) != nullptr || told_by_other_columns(*effect)) return;
+        if (fit.parameters().find(effect) != nullptr || estimated_from_other_columns(*effect)) return;
         try {
             found[k] = score_test(fit, without, *effect);
         } catch (const RunError&) {

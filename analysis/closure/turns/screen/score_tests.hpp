@@ -12,11 +12,11 @@ struct Candidate {
     effects::Values values;
     double chi2 = 0.0;                    ///< twice the gain of the log-likelihood under the fitted noise
     double p_value = 1.0;                 ///< by chance, with the search over times and frequencies included
-    double searched = 1.0;                ///< look-elsewhere factor of the search
+    double look_elsewhere = 1.0;          ///< look-elsewhere factor of the search
     effects::Values sd = {};              ///< standard errors, if the first estimate is also the last
     std::shared_ptr<Fitted> fitted = {};  ///< the model with it, after a full fit; then p_value is of that fit
     /// Evidence of the full fit: gain of the log-likelihood with amplitudes integrated out, less the search.
-    double merit = 0.0;
+    double evidence = 0.0;
 };
 
 /// The score test of one effect that is not in the fit, whose prediction is `without`. None if the effect does not act

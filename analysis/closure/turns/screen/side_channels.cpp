@@ -40,13 +40,13 @@ struct ShapeFit {
         const Eigen::Vector2d of_ratio{0.5 * units::pi, shape.sides_by_ratio};
         const Eigen::Vector2d of_sine{-1.0, -shape.sides_by_sine};
         const bool sides = shape.sides && std::isfinite(shape.sides->sd);
-        const Eigen::Vector2d told{w * shape.late_s.value, sides ? shape.sides->value : 0.0};
+        const Eigen::Vector2d fitted{w * shape.late_s.value, sides ? shape.sides->value : 0.0};
         const Eigen::Vector2d weight{std::pow(w * shape.late_s.sd, -2), sides ? std::pow(shape.sides->sd, -2) : 0.0};
         if (asymmetry && harmonic && sides) {
             Eigen::Matrix2d model;
             model << of_ratio, of_sine;
             const Eigen::Matrix2d back = model.inverse();
-            const Eigen::Vector2d found = back * told;
+            const Eigen::Vector2d found = back * fitted;
             const Eigen::Matrix2d covariance = back * weight.cwiseInverse().asDiagonal() * back.transpose();
             ratio = found(0);
             ratio_sd = std::sqrt(covariance(0, 0));
@@ -57,7 +57,7 @@ struct ShapeFit {
             const double information = model.cwiseAbs2().dot(weight);
             (asymmetry ? ratio_sd : sine_sd) = std::sqrt(1.0 / information);
             if (information > 0.0) {
-                (asymmetry ? ratio : sine) = model.cwiseProduct(told).dot(weight) / information;
+                (asymmetry ? ratio : sine) = model.cwiseProduct(fitted).dot(weight) / information;
             }
         }
         if (harmonic && shape.turns && std::isfinite(shape.turns->sd)) {
@@ -95,21 +95,21 @@ std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const
     ActiveEffect* asymmetry = parameters.find(roles.asymmetry.effect);
     ActiveEffect* harmonic = parameters.find(roles.harmonic.effect);
     if (asymmetry == nullptr && harmonic == nullptr) return std::nullopt;
-    const ShapeFit told(dither_shape(turns, fit), units::pi / fit.model().series().interval_s, asymmetry != nullptr,
-                        harmonic != nullptr);
+    const ShapeFit fitted(dither_shape(turns, fit), units::pi / fit.model().series().interval_s, asymmetry != nullptr,
+                          harmonic != nullptr);
     bool moved = false;
     if (asymmetry != nullptr) {
         double& ratio = asymmetry->values.at(roles.asymmetry.ratio);
-        moved = std::abs(told.ratio - ratio) > same * told.ratio_sd;
-        ratio = told.ratio;
+        moved = std::abs(fitted.ratio - ratio) > same * fitted.ratio_sd;
+        ratio = fitted.ratio;
     }
     if (harmonic != nullptr) {
         double& ratio = harmonic->values.at(roles.harmonic.ratio);
         double& phase_rad = harmonic->values.at(roles.harmonic.phase_rad);
-        moved = moved || std::abs(told.sine - ratio * std::sin(phase_rad)) > same * told.sine_sd ||
-                std::abs(told.cosine - ratio * std::cos(phase_rad)) > same * told.cosine_sd;
-        ratio = told.harmonic_ratio();
-        phase_rad = told.harmonic_phase_rad();
+        moved = moved || std::abs(fitted.sine - ratio * std::sin(phase_rad)) > same * fitted.sine_sd ||
+                std::abs(fitted.cosine - ratio * std::cos(phase_rad)) > same * fitted.cosine_sd;
+        ratio = fitted.harmonic_ratio();
+        phase_rad = fitted.harmonic_phase_rad();
     }
     return moved ? std::optional(parameters) : std::nullopt;
 }

@@ -1,4 +1,4 @@
-#include "analysis/closure/samples/rounded/summit.hpp"
+#include "analysis/closure/samples/rounded/maximum.hpp"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -16,9 +16,9 @@ namespace {
 /// A step of at most so many standard errors is the last.
 constexpr double little = 0.5;
 
-class Climb {
+class Maximisation {
    public:
-    Climb(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, const RoundedSummit* near)
+    Maximisation(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, const RoundedMaximum* near)
         : fit_(fit), rounded_(rounded), until_(until), model_(fit.model()) {
         here_ = at(model_);
         log_length_ = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(noises()), first_log);
@@ -29,11 +29,11 @@ class Climb {
     double log_likelihood() const { return here_; }
 
     /// Moves all noises by one parabola; returns the distance in standard errors.
-    double climb_noises();
+    double maximise_over_noises();
     const std::vector<double>& noise_log_sd() const { return noise_log_sd_; }
     /// Moves the columns, by one parabola for each direction that would be independent of the others if the increments
     /// were known; returns the distance in standard errors.
-    double climb_columns();
+    double maximise_over_columns();
     const std::vector<double>& column_times() const { return column_times_; }
 
    private:
@@ -50,7 +50,7 @@ class Climb {
         return values;
     }
     void measure_roughness();
-    void begin_near(const RoundedSummit& summit);
+    void begin_near(const RoundedMaximum& maximum);
     bool random() const { return model_.walk || model_.flicker; }
     std::size_t noises() const {
         return (random() ? 3U : 2U) + model_.noise.resonances.size() + (model_.motion.empty() ? 0U : 1U);
@@ -58,7 +58,7 @@ class Climb {
     /// The noises with their logarithms moved by `lengths` in units of log_length_.
     SampleModel with_noises(const Eigen::VectorXd& lengths) const;
     SampleModel with_columns(const Eigen::VectorXd& moved) const;
-    void climb_to(SampleModel&& model, double log_likelihood) {
+    void maximise_to(SampleModel&& model, double log_likelihood) {
         model_ = std::move(model);
         here_ = log_likelihood;
     }
@@ -76,7 +76,7 @@ class Climb {
 
 /// The log-likelihood of the filters is rough: it varies between nearly equal models, most of all with strong random
 /// rates.
-void Climb::measure_roughness() {
+void Maximisation::measure_roughness() {
     constexpr double nothing = 0.005;  // lengths
     constexpr double most_off = 4.0;
     constexpr double bends = 8.0;
@@ -87,14 +87,14 @@ void Climb::measure_roughness() {
     wanted_bend_ = bends * off_by_;
 }
 
-void Climb::begin_near(const RoundedSummit& summit) {
+void Maximisation::begin_near(const RoundedMaximum& maximum) {
     constexpr double least_log = 0.02;
     for (Eigen::Index i = 0; i < log_length_.size(); ++i) {
-        if (static_cast<std::size_t>(i) >= summit.noise_log_sd.size()) break;
-        const double sd = summit.noise_log_sd[static_cast<std::size_t>(i)];
+        if (static_cast<std::size_t>(i) >= maximum.noise_log_sd.size()) break;
+        const double sd = maximum.noise_log_sd[static_cast<std::size_t>(i)];
         log_length_(i) = std::clamp(std::sqrt(wanted_bend_) * sd, least_log, first_log);
     }
-    const SampleModel& other = summit.model;
+    const SampleModel& other = maximum.model;
     if (other.walk != model_.walk || other.flicker != model_.flicker) return;
     if (other.noise.terms.size() != model_.noise.terms.size()) return;
     const bool same_resonances =
@@ -109,10 +109,10 @@ void Climb::begin_near(const RoundedSummit& summit) {
     model.motion = other.motion;
     model.flicker_deg_h = other.flicker_deg_h;
     const double there = at(model);
-    if (there > here_) climb_to(std::move(model), there);
+    if (there > here_) maximise_to(std::move(model), there);
 }
 
-SampleModel Climb::with_noises(const Eigen::VectorXd& lengths) const {
+SampleModel Maximisation::with_noises(const Eigen::VectorXd& lengths) const {
     const Eigen::VectorXd times = lengths.cwiseProduct(log_length_).array().exp();
     SampleModel model = model_;
     model.noise.angle_arcsec *= times(0);
@@ -128,7 +128,7 @@ SampleModel Climb::with_noises(const Eigen::VectorXd& lengths) const {
     return model;
 }
 
-SampleModel Climb::with_columns(const Eigen::VectorXd& moved) const {
+SampleModel Maximisation::with_columns(const Eigen::VectorXd& moved) const {
     SampleModel model = model_;
     for (std::size_t k = 0; k < model.columns.size(); ++k) {
         model.columns[k].value += moved(static_cast<Eigen::Index>(k));
@@ -136,7 +136,7 @@ SampleModel Climb::with_columns(const Eigen::VectorXd& moved) const {
     return model;
 }
 
-double Climb::climb_noises() {
+double Maximisation::maximise_over_noises() {
     constexpr double most = 2.0;  // lengths
     constexpr double softest = 0.25;
     constexpr double part = 0.01;
@@ -146,15 +146,15 @@ double Climb::climb_noises() {
     Eigen::VectorXd slope(m);
     Eigen::VectorXd more(m);
     Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(m, m);
-    std::vector<SampleModel> beside;
+    std::vector<SampleModel> shifted;
     for (Eigen::Index i = 0; i < m; ++i) {
-        beside.push_back(with_noises(axis(i)));
-        beside.push_back(with_noises(-axis(i)));
+        shifted.push_back(with_noises(axis(i)));
+        shifted.push_back(with_noises(-axis(i)));
     }
     for (Eigen::Index i = 0; i < m; ++i) {
-        for (Eigen::Index j = 0; j < i; ++j) beside.push_back(with_noises(axis(i) + axis(j)));
+        for (Eigen::Index j = 0; j < i; ++j) shifted.push_back(with_noises(axis(i) + axis(j)));
     }
-    const auto values = at(beside);
+    const auto values = at(shifted);
     for (Eigen::Index i = 0; i < m; ++i) {
         more(i) = values[2 * static_cast<std::size_t>(i)];
         const double less = values[2 * static_cast<std::size_t>(i) + 1];
@@ -193,7 +193,7 @@ double Climb::climb_noises() {
         SampleModel next = with_noises(lengths);
         const double there = at(next);
         if (there < here_ - off_by_) continue;
-        climb_to(std::move(next), there);
+        maximise_to(std::move(next), there);
         furthest = lengths.cwiseAbs().cwiseQuotient(variance.cwiseSqrt().cwiseMin(0.5)).maxCoeff();
         break;
     }
@@ -207,7 +207,7 @@ double Climb::climb_noises() {
     return furthest;
 }
 
-double Climb::climb_columns() {
+double Maximisation::maximise_over_columns() {
     constexpr double first_length = 3.0;  // standard errors with known increments
     constexpr int doublings = 3;
     const double enough = 5.0 * off_by_;
@@ -233,15 +233,15 @@ double Climb::climb_columns() {
     // Longer where the increments carry little information
     for (int k = 0; k <= doublings; ++k) {
         std::vector<Along*> open;
-        std::vector<SampleModel> beside;
+        std::vector<SampleModel> shifted;
         for (Along& along : all) {
             if (along.bend * along.length * along.length > enough) continue;
             if (k > 0) along.length *= 2.0;
             open.push_back(&along);
-            beside.push_back(with_columns(along.length * along.direction));
-            beside.push_back(with_columns(-along.length * along.direction));
+            shifted.push_back(with_columns(along.length * along.direction));
+            shifted.push_back(with_columns(-along.length * along.direction));
         }
-        const auto values = at(beside);
+        const auto values = at(shifted);
         for (std::size_t i = 0; i < open.size(); ++i) {
             const double more = values[2 * i];
             const double less = values[2 * i + 1];
@@ -262,7 +262,7 @@ double Climb::climb_columns() {
         SampleModel next = with_columns(moved);
         const double there = at(next);
         higher = there > here_ - off_by_;
-        if (higher) climb_to(std::move(next), there);
+        if (higher) maximise_to(std::move(next), there);
     }
     if (!higher) furthest = 0.0;
     column_times_.clear();
@@ -274,24 +274,24 @@ double Climb::climb_columns() {
 
 }  // namespace
 
-RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, int most_rounds,
-                             const RoundedSummit* near) {
-    Climb climb(fit, rounded, until, near);
+RoundedMaximum towards_maximum(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until,
+                               int most_rounds, const RoundedMaximum* near) {
+    Maximisation maximise(fit, rounded, until, near);
     for (int round = 0; round < most_rounds; ++round) {
-        if (climb.climb_noises() < little) break;
+        if (maximise.maximise_over_noises() < little) break;
     }
-    return {climb.model(), climb.log_likelihood(), climb.noise_log_sd(), {}};
+    return {maximise.model(), maximise.log_likelihood(), maximise.noise_log_sd(), {}};
 }
 
-RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
-                          const RoundedSummit* near) {
-    Climb climb(fit, rounded, rounded.arcsec.size(), near);
+RoundedMaximum find_maximum(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
+                            const RoundedMaximum* near) {
+    Maximisation maximise(fit, rounded, rounded.arcsec.size(), near);
     for (int round = 0; round < most_rounds; ++round) {
-        const double columns = climb.climb_columns();
-        const double noises = climb.climb_noises();
+        const double columns = maximise.maximise_over_columns();
+        const double noises = maximise.maximise_over_noises();
         if (std::max(columns, noises) < little) break;
     }
-    return {climb.model(), climb.log_likelihood(), climb.noise_log_sd(), climb.column_times()};
+    return {maximise.model(), maximise.log_likelihood(), maximise.noise_log_sd(), maximise.column_times()};
 }
 
 }  // namespace ringlock::closure

@@ -9,7 +9,7 @@ namespace ringlock::closure {
 
 /// Frequency track of a line: a polynomial of the time from the middle of the record. A dither follows the temperature
 /// of its springs: evenly over minutes, on a curve over an hour.
-struct LineCourse {
+struct FrequencyTrack {
     static constexpr std::size_t most = options.samples.lines.most_coefficients;
     double hz = 0.0;  ///< in the middle of the record
     /// Derivatives of the frequency there, from the first on [Hz/s, Hz/s^2, ...].
@@ -44,19 +44,19 @@ struct LineCourse {
         return unit;
     }
     /// The same track at an alias, `other_hz` in the middle; the drifts change sign if `folded`.
-    LineCourse shown_at(double other_hz, bool folded) const {
-        LineCourse other = *this;
+    FrequencyTrack shown_at(double other_hz, bool folded) const {
+        FrequencyTrack other = *this;
         other.hz = other_hz;
         if (folded) {
             for (double& drift : other.drifts) drift = -drift;
         }
         return other;
     }
-    static LineCourse still(double hz) { return {hz, {}, 1}; }
-    static LineCourse even(double hz, double drift_hz_per_s) { return {hz, {drift_hz_per_s}, 2}; }
+    static FrequencyTrack still(double hz) { return {hz, {}, 1}; }
+    static FrequencyTrack even(double hz, double drift_hz_per_s) { return {hz, {drift_hz_per_s}, 2}; }
 };
 
 /// Phase of a line at each sample [rad], without whole cycles, zero in the middle of the record.
-std::vector<double> line_phase(std::size_t size, double rate_hz, const LineCourse& course);
+std::vector<double> line_phase(std::size_t size, double rate_hz, const FrequencyTrack& track);
 
 }  // namespace ringlock::closure

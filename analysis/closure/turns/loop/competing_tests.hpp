@@ -2,10 +2,10 @@
 #include <optional>
 
 #include "analysis/closure/turns/loop/choice.hpp"
-#include "analysis/closure/turns/residual/views.hpp"
+#include "analysis/closure/turns/residual/residual_tests.hpp"
 
-/// Residual tests as rivals of the library: structure that a test explains better than any effect has a cause that is
-/// not in the library.
+/// Residual tests that compete with the library: structure that a test explains better than any effect has a cause that
+/// is not in the library.
 namespace ringlock::closure {
 
 /// Frequency of the effect in that fit [Hz], if it has one.
@@ -25,7 +25,7 @@ std::optional<double> better_than_library(const TurnFit& fit, const Choice& choi
 /// Whether a second effect next to the chosen one, one of them of the coupling, reaches the evidence of a residual
 /// test, since neither of two such effects may explain the record alone. Pairs of rates are not allowed, since they
 /// could follow nearly any cause.
-bool two_explain(const TurnProblem& problem, const Choice& choice, double merit_of_test);
+bool two_explain(const TurnProblem& problem, const Choice& choice, double evidence_of_test);
 
 /// Tests of the residual, and the location of structure if any fails: the failing regression that explains most with
 /// the noise fitted again, or the failing test with the smallest p-value if no regression explains anything.

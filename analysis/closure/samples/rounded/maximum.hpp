@@ -10,7 +10,7 @@
 /// where the steps hide most of the information: each fit to them goes a small part of the way.
 namespace ringlock::closure {
 
-struct RoundedSummit {
+struct RoundedMaximum {
     SampleModel model;
     double log_likelihood = 0.0;
     /// Standard errors of the logarithms of the noises: white angle, white rate, random rate where there is one,
@@ -22,11 +22,11 @@ struct RoundedSummit {
 
 /// Noises alone, from a distant start, by the increments up to row `until`; columns are unchanged.
 /// \param near  maximum for a similar model, or null: its noises are the start where they are likelier
-RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, int most_rounds,
-                             const RoundedSummit* near = nullptr);
+RoundedMaximum towards_maximum(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until,
+                               int most_rounds, const RoundedMaximum* near = nullptr);
 
 /// Noises and columns, from a model near the maximum.
-RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
-                          const RoundedSummit* near = nullptr);
+RoundedMaximum find_maximum(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
+                            const RoundedMaximum* near = nullptr);
 
 }  // namespace ringlock::closure

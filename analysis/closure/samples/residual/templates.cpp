@@ -1,4 +1,4 @@
-#include "analysis/closure/samples/residual/views.hpp"
+#include "analysis/closure/samples/residual/templates.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,8 @@ Columns taken_by(const SampleFit& fit, const Columns& columns) {
     return taken;
 }
 
-void test_places(const SampleFit& fit, Where where, const std::string& view, const Places& of, Views& views) {
+void test_templates(const SampleFit& fit, Where where, const std::string& subject, const Templates& of,
+                    SampleResidualTests& tests) {
     double chi2 = 0.0;
     int rank = 0;
     std::size_t at = 0;
@@ -29,9 +30,10 @@ void test_places(const SampleFit& fit, Where where, const std::string& view, con
     if (rank == 0) return;
     const double cost = rank + std::log(static_cast<double>(of.count));
     const double p = of_several(chi2_tail(chi2, rank), static_cast<double>(of.count));
-    views.push_back(
-        {{where, view, p, of.said(at), 0.5 * chi2 - cost}, cost, [columns = of.columns, at] { return columns(at); }});
-    views.back().courses = of.courses;
+    tests.push_back({{where, subject, p, of.said(at), 0.5 * chi2 - cost}, cost, [columns = of.columns, at] {
+                         return columns(at);
+                     }});
+    tests.back().trends = of.trends;
 }
 
 }  // namespace ringlock::closure

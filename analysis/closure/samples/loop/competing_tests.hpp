@@ -8,9 +8,9 @@
 namespace ringlock::closure {
 
 /// A residual test as a competitor of effects: the gain by its own regression, with the noise fitted again.
-struct Rival {
-    double merit = 0.0;    ///< evidence: gain of the log-likelihood less its cost [nats]
-    double courses = 0.0;  ///< number of its columns that are trends in time
+struct CompetingTest {
+    double evidence = 0.0;  ///< evidence: gain of the log-likelihood less its cost [nats]
+    double trends = 0.0;    ///< number of its columns that are trends in time
     Where where = Where::time;
     bool jumps = false;
     bool repeats = false;                    ///< a variance that oscillates
@@ -24,6 +24,6 @@ struct Rival {
 /// \param lattice_arcsec  quantisation of the values
 /// \param resampled       whether the record may be resampled: a variance that oscillates is then fitted as well
 /// \param moved           whether the case may have moved: power that scatters about a line is then fitted as well
-std::vector<Rival> rivals_of(const SampleFit& fit, double lattice_arcsec, bool resampled, bool moved);
+std::vector<CompetingTest> competing_tests_of(const SampleFit& fit, double lattice_arcsec, bool resampled, bool moved);
 
 }  // namespace ringlock::closure

@@ -10,7 +10,7 @@
 
 namespace ringlock::test::closure {
 
-/// What the loop has said of a record, on standard output.
+/// Prints the answer of the loop on a record to standard output.
 inline void print(const char* name, const ringlock::closure::Closure& closure) {
     std::printf("%s: %s, held-out error %.6g -> %.6g", name, std::string(name_of(closure.verdict)).c_str(),
                 closure.heldout_before, closure.heldout_after);

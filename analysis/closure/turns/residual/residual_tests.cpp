@@ -1,4 +1,4 @@
-#include "analysis/closure/turns/residual/views.hpp"
+#include "analysis/closure/turns/residual/residual_tests.hpp"
 
 #include <fmt/format.h>
 
@@ -113,7 +113,7 @@ void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
     score.chi2 = score.value.dot(dense::solve_symmetric(covariance, score.value));
 }
 
-void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_phase(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     // The innovation is a part of the phase that was read. Their correlation without a missing effect is known for
     // normal innovations (Stein, Annals of Statistics 9, 1981, 1135) and for those of a known density.
     const bool known = fit.parameters().shape || !is_of_even_density(fit.innovations(), fit.rows());
@@ -134,7 +134,7 @@ void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
             cost = score.rank + std::log(static_cast<double>(harmonics_of_phase));
             most = 0.5 * score.chi2 - cost;
         }
-        views.push_back(
+        tests.push_back(
             {{Where::phase,
               kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
               of_several(least, harmonics_of_phase), fmt::format("harmonic {}", at), most},
@@ -145,12 +145,12 @@ void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
 }
 
 /// A lock-in that is not constant: kicks at the phase, times slow oscillations.
-void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
-    constexpr std::size_t places = options.turns.residual.kick_periods;
+void test_kicks_over_time(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
+    constexpr std::size_t positions = options.turns.residual.kick_periods;
     const auto periods_of = [](std::size_t place) { return 0.5 * static_cast<double>(place + 1); };
-    std::vector<TurnFit::Score> scores(places);
+    std::vector<TurnFit::Score> scores(positions);
     // One after the other, with the columns of each in parallel.
-    for (std::size_t place = 0; place < places; ++place) {
+    for (std::size_t place = 0; place < positions; ++place) {
         scores[place] = fit.score(of_changing_kicks, [&](std::size_t column) {
             return column_of_changing_kicks(fit, periods_of(place), column);
         });
@@ -160,25 +160,26 @@ void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
     const TurnFit::Score& score = *most;
     const double periods = periods_of(static_cast<std::size_t>(most - scores.begin()));
     if (score.rank == 0) return;
-    const double cost = score.rank + std::log(static_cast<double>(places));
-    views.push_back({{Where::time, "kicks that change in time", of_several(chi2_tail(score.chi2, score.rank), places),
-                      fmt::format("{:g} periods over the record", periods), 0.5 * score.chi2 - cost},
-                     cost,
-                     [&fit, periods] { return kicks_that_change(fit, periods); },
-                     options.turns.residual.largest_kick_rad});
+    const double cost = score.rank + std::log(static_cast<double>(positions));
+    tests.push_back(
+        {{Where::time, "kicks that change in time", of_several(chi2_tail(score.chi2, score.rank), positions),
+          fmt::format("{:g} periods over the record", periods), 0.5 * score.chi2 - cost},
+         cost,
+         [&fit, periods] { return kicks_that_change(fit, periods); },
+         options.turns.residual.largest_kick_rad});
 }
 
 /// Amplitude of the dither at the turns over its mean: second differences of the phases, in which a constant rate
 /// cancels, with the kicks of the lock-in subtracted. The first and the last value repeat those next to them.
 std::vector<double> amplitude_at_turns(const TurnFit& fit) {
     const auto& series = fit.model().series();
-    const auto& foretold = fit.prediction().phase_rad;
+    const auto& predicted = fit.prediction().phase_rad;
     const auto& phase = fit.model().phase_rad();
     const std::size_t n = series.size();
     std::vector<double> amplitude(n, 1.0);
     for (std::size_t i = 1; i + 1 < n; ++i) {
         double second = 0.0;
-        for (const std::size_t k : {i - 1, i, i, i + 1}) second += (k == i ? 1.0 : -1.0) * (phase[k] - foretold[k]);
+        for (const std::size_t k : {i - 1, i, i, i + 1}) second += (k == i ? 1.0 : -1.0) * (phase[k] - predicted[k]);
         amplitude[i] = -0.25 * series.direction[i] * second / series.amplitude_rad;
     }
     amplitude[0] = amplitude[1];
@@ -209,14 +210,14 @@ double gain_of_walk(const std::vector<double>& series) {
                       of.most_gain);
 }
 
-void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_rates(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     const auto& series = fit.model().series();
     const std::size_t n = series.size();
-    const auto against = [&](Where where, std::string view, Columns columns) {
+    const auto against = [&](Where where, std::string subject, Columns columns) {
         const auto score = fit.score(columns);
         if (score.rank == 0) return;
         const double cost = score.rank;
-        views.push_back({{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+        tests.push_back({{where, std::move(subject), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
                          cost,
                          [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
     };
@@ -262,9 +263,9 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
         return Columns{integral(fit, change), integral(fit, square)};
     };
     against(Where::amplitude, "rates that follow the dither's amplitude and its square", angles(amplitude));
-    if (!views.empty() && views.back().test.where == Where::amplitude) {
+    if (!tests.empty() && tests.back().result.where == Where::amplitude) {
         // The columns for the evidence, after the test has failed, also use the cycles after the turn.
-        views.back().columns = [at_turn, amplitude, angles, memory, n, last = mean_of(at_turn->rbegin())] {
+        tests.back().columns = [at_turn, amplitude, angles, memory, n, last = mean_of(at_turn->rbegin())] {
             std::vector<double> change = amplitude;
             double after = last;
             for (std::size_t i = n; i-- > 0;) {
@@ -287,12 +288,12 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
     against(Where::time, "rates that are polynomials of time", powers);
 }
 
-void test_steps(const TurnFit& fit, std::vector<TurnView>& views) {
-    constexpr int places = options.turns.residual.steps;
+void test_steps(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
+    constexpr int positions = options.turns.residual.steps;
     const auto& time = fit.model().series().time_s;
-    std::vector<double> roots(places - 1);
+    std::vector<double> roots(positions - 1);
     const auto ramp_of = [&time](std::size_t k) {
-        const double start = time.back() * static_cast<double>(k + 1) / places;
+        const double start = time.back() * static_cast<double>(k + 1) / positions;
         std::vector<double> ramp(time.size());
         for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - start);
         return ramp;
@@ -307,29 +308,29 @@ void test_steps(const TurnFit& fit, std::vector<TurnView>& views) {
         std::max_element(roots.begin(), roots.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
     const double chi2 = *most * *most;
     const auto at = static_cast<std::size_t>(most - roots.begin());
-    const double cost = 2.0 + std::log(davies_places(chi2, roots));
-    views.push_back(
+    const double cost = 2.0 + std::log(davies_look_elsewhere(chi2, roots));
+    tests.push_back(
         {{Where::time, "steps of the rate", davies_bound(chi2, roots),
-          fmt::format("at {:.6g} s", time.back() * static_cast<double>(at + 1) / places), 0.5 * chi2 - cost},
+          fmt::format("at {:.6g} s", time.back() * static_cast<double>(at + 1) / positions), 0.5 * chi2 - cost},
          cost,
          [ramp_of, at] { return Columns{ramp_of(at)}; }});
 }
 
 /// A rate that jumps between two levels, by the rates of stretches of the record.
-void test_levels(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_levels(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     const TwoLevels found = levels_of_stretches(fit);
-    TurnView& view = views.emplace_back();
-    view.test = {Where::time, "a rate that jumps between two levels", found.p_value,
-                 fmt::format("{} jumps", found.changes), found.merit};
-    view.cost = found.cost + options.turns.jumps.cost_of_place * found.changes;
-    view.columns = [&fit, found] { return Columns{placed_jumps(fit, found)}; };
-    view.jumps = found.changes > 1;
-    if (view.jumps) {
-        view.refitted = [&fit, found](double rival) { return merit_of_jumps(fit, found, rival); };
+    TurnResidualTest& test = tests.emplace_back();
+    test.result = {Where::time, "a rate that jumps between two levels", found.p_value,
+                   fmt::format("{} jumps", found.changes), found.evidence};
+    test.cost = found.cost + options.turns.jumps.cost_of_place * found.changes;
+    test.columns = [&fit, found] { return Columns{placed_jumps(fit, found)}; };
+    test.jumps = found.changes > 1;
+    if (test.jumps) {
+        test.refitted = [&fit, found](double competing) { return evidence_of_jumps(fit, found, competing); };
     }
 }
 
-void test_whiteness(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_whiteness(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     const Correlations found = correlations_of(fit.innovations(), fit.rows());
     double rising = 0.0;       // sum of correlations: slow changes
     double alternating = 0.0;  // the same with alternating signs: changes of the dither's amplitude
@@ -338,11 +339,11 @@ void test_whiteness(const TurnFit& fit, std::vector<TurnView>& views) {
         alternating += k % 2 == 0 ? found.root[k] : -found.root[k];
     }
     const Where where = std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time;
-    views.push_back({found.test(where, fmt::format("correlation with the {} turns before", options.stats.lags))});
+    tests.push_back({found.test(where, fmt::format("correlation with the {} turns before", options.stats.lags))});
 }
 
 /// Lines, including those that drift.
-void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_lines(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     constexpr int drifts = options.turns.residual.drifts;
     constexpr double apart = options.turns.residual.drifts_apart;
     const auto& e = fit.innovations();
@@ -373,14 +374,14 @@ void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
             if (std::norm(out[bin]) > lines[k].power) lines[k] = {std::norm(out[bin]), bin};
         }
     });
-    const double places = options.turns.residual.places_per_bin * static_cast<double>(n);
+    const double positions = options.turns.residual.trials_per_bin * static_cast<double>(n);
     const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
-    const auto report = [&](const char* view, const Line& line, double searched, double drift) {
+    const auto report = [&](const char* subject, const Line& line, double look_elsewhere, double drift) {
         const double chi2 = 2.0 * line.power / power;
         const double duration_s = static_cast<double>(n) * fit.model().series().interval_s;
         const double periods = static_cast<double>(line.bin) * bin_hz * duration_s;
-        const double cost = 2.0 + std::log(searched);
-        views.push_back({{Where::frequency, view, of_several(chi2_tail(chi2, 2), searched),
+        const double cost = 2.0 + std::log(look_elsewhere);
+        tests.push_back({{Where::frequency, subject, of_several(chi2_tail(chi2, 2), look_elsewhere),
                           fmt::format("at {:.6g} Hz{}", static_cast<double>(line.bin) * bin_hz,
                                       drift != 0.0 ? fmt::format(", drifting by {:.2g} Hz", drift / duration_s) : ""),
                           0.5 * chi2 - cost},
@@ -395,60 +396,60 @@ void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
                              }
                              return columns;
                          }});
-        views.back().hz = static_cast<double>(line.bin) * bin_hz;
+        tests.back().hz = static_cast<double>(line.bin) * bin_hz;
     };
-    report("lines", lines[drifts / 2], places, 0.0);
+    report("lines", lines[drifts / 2], positions, 0.0);
     // A line of constant frequency does not count as one that drifts slightly.
     lines[drifts / 2] = {};
     const auto best =
         std::max_element(lines.begin(), lines.end(), [](const Line& a, const Line& b) { return a.power < b.power; });
-    report("lines that drift", *best, drifts * places, drift_of(static_cast<std::size_t>(best - lines.begin())));
+    report("lines that drift", *best, drifts * positions, drift_of(static_cast<std::size_t>(best - lines.begin())));
 }
 
 /// Innovations are normal with a true random rate, but not necessarily with one that substitutes for another cause.
-void test_normality(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_normality(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     const std::size_t bounded = options.turns.residual.bounded_sums;
-    if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1, bounded)) views.push_back({*test});
+    if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1, bounded)) tests.push_back({*test});
     const TurnNoise noise = fit.model().noise(fit.parameters());
     if (noise.rates.empty() && noise.walk_rad2_per_s3 == 0.0) return;
     const auto& time = fit.model().series().time_s;
     std::vector<double> ramp(time.size());
     for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - time[time.size() / 2]);
     if (const auto jump = largest_jump(fit.innovations(), fit.rows(), fit.whitened_alone(ramp))) {
-        views.emplace_back().test = test_of(*jump);
+        tests.emplace_back().result = test_of(*jump);
     }
 }
 
-void test_size(const TurnFit& fit, std::vector<TurnView>& views) {
+void test_size(const TurnFit& fit, std::vector<TurnResidualTest>& tests) {
     const TurnOptions::Residual& of = options.turns.residual;
-    views.push_back({size_over_time(fit.innovations(), fit.rows(), of.stretches_of_size, of.fewest_rows_of_size)});
+    tests.push_back({size_over_time(fit.innovations(), fit.rows(), of.stretches_of_size, of.fewest_rows_of_size)});
     if (is_of_even_density(fit.innovations(), fit.rows())) return;
-    views.push_back({size_over_phase(fit)});
+    tests.push_back({size_over_phase(fit)});
 }
 
 }  // namespace
 
-double refitted_merit(const TurnFit& fit, const TurnView& view, double rival) {
-    if (view.refitted) return view.refitted(rival);
-    const TurnFit::Regression regression = fit.regress(view.columns());
-    if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
+double refitted_evidence(const TurnFit& fit, const TurnResidualTest& test, double competing) {
+    if (test.refitted) return test.refitted(competing);
+    const TurnFit::Regression regression = fit.regress(test.columns());
+    if (regression.value.cwiseAbs().maxCoeff() > test.largest) return -std::numeric_limits<double>::infinity();
     // The cost of the test contains one for each of the amplitudes.
     const auto amplitudes = static_cast<int>(regression.value.size());
-    return regression.gain - (view.cost - amplitudes) - cost_of_amplitudes(regression.gain, amplitudes);
+    return regression.gain - (test.cost - amplitudes) - cost_of_amplitudes(regression.gain, amplitudes);
 }
 
-std::vector<TurnView> view_residual(const TurnFit& fit) {
-    std::vector<TurnView> views;
-    test_phase(fit, views);
-    test_kicks_over_time(fit, views);
-    test_rates(fit, views);
-    test_steps(fit, views);
-    test_levels(fit, views);
-    test_whiteness(fit, views);
-    test_lines(fit, views);
-    test_size(fit, views);
-    test_normality(fit, views);
-    return views;
+std::vector<TurnResidualTest> test_residual(const TurnFit& fit) {
+    std::vector<TurnResidualTest> tests;
+    test_phase(fit, tests);
+    test_kicks_over_time(fit, tests);
+    test_rates(fit, tests);
+    test_steps(fit, tests);
+    test_levels(fit, tests);
+    test_whiteness(fit, tests);
+    test_lines(fit, tests);
+    test_size(fit, tests);
+    test_normality(fit, tests);
+    return tests;
 }
 
 }  // namespace ringlock::closure
