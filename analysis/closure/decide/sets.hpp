@@ -11,7 +11,7 @@ namespace ringlock::closure {
 /// Effects that explain the record together.
 struct EffectSet {
     std::vector<const effects::Effect*> effects;
-    double evidence = 0.0;  ///< evidence: log-likelihood gain less the cost of parameters and search [nats]
+    double evidence = 0.0;  ///< log-likelihood gain less the cost of parameters and search [nats]
 
     bool has(const effects::Effect* effect) const;
 };

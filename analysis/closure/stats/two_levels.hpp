@@ -7,7 +7,7 @@ namespace ringlock::closure {
 struct TwoLevels {
     double chi2 = 0.0;  ///< chi-squared that the jumps explain
     int changes = 0;
-    double evidence = 0.0;       ///< evidence: gain of the log-likelihood less the cost
+    double evidence = 0.0;       ///< gain of the log-likelihood less the cost
     double cost = 0.0;           ///< cost of levels and places
     double p_value = 1.0;        ///< by chance, with the search over all paths of as many changes
     Eigen::VectorXd shape = {};  ///< 1 in the stretches of one level, 0 in those of the other

@@ -9,7 +9,7 @@ namespace ringlock::closure {
 
 /// A residual test as a competitor of effects: the gain by its own regression, with the noise fitted again.
 struct CompetingTest {
-    double evidence = 0.0;  ///< evidence: gain of the log-likelihood less its cost [nats]
+    double evidence = 0.0;  ///< gain of the log-likelihood less its cost [nats]
     double trends = 0.0;    ///< number of its columns that are trends in time
     Where where = Where::time;
     bool jumps = false;

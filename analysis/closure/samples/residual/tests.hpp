@@ -42,7 +42,7 @@ struct UnsteadyLine {
     double hz = 0.0;
     double p_value = 1.0;
     double off = 0.0;       ///< power of its variations relative to that of the line
-    double adjacent = 0.0;  ///< power of another line within beside_hz of it, relative to that of the line
+    double adjacent = 0.0;  ///< power of another line within `adjacent_hz` of it, relative to that of the line
 };
 UnsteadyLine unsteady_line(const SampleFit& fit);
 

@@ -11,7 +11,7 @@ namespace ringlock::closure {
 /// An extended model of the dither's amplitude.
 struct AmplitudeModel {
     std::shared_ptr<Fitted> fitted;
-    double evidence = 0.0;  ///< evidence: gain of the log-likelihood, with costs as for an effect
+    double evidence = 0.0;  ///< gain of the log-likelihood, with costs as for an effect
 };
 
 /// An oscillation of the amplitude for structure of the innovations so near the dither's frequency that a vibration of
