@@ -61,7 +61,11 @@ std::filesystem::path folder_in_memory() {
 void tell_stack(int signal) {
     std::array<void*, 64> frames{};
     const int count = backtrace(frames.data(), static_cast<int>(frames.size()));
-    backtrace_symbols_fd(frames.data() + 1, count - 1, STDERR_FILENO);  // but for this function
+    // Without this function and, under a sanitizer, its backtrace(): the frames begin where the handler returns to.
+    const auto end = frames.begin() + count;
+    const auto found = std::find(frames.begin(), end, __builtin_return_address(0));
+    const auto from = found == end ? frames.begin() : found;
+    backtrace_symbols_fd(&*from, static_cast<int>(end - from), STDERR_FILENO);
     _exit(signal == SIGPROF ? looped : 128 + signal);
 }
 
