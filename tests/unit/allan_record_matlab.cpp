@@ -1,6 +1,8 @@
 #include <zlib.h>
 
 #include <cstdint>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -108,6 +110,22 @@ TEST_F(AllanRecordMatlab, AMatrixOfNoBytesClaimsNothing) {
         file(head + test::bytes_of<std::uint32_t>({14, 0, 6, 8, 12, 0, 5, 8, 0xffffffff, 1, 1, 0, 16, 16, 1, 2, 3, 4}),
              "bad.mat");
     EXPECT_THAT(error_of(path), HasSubstr("bad.mat: dataset /: says that it has 4294967295 values"));
+}
+
+// The name would mean either.
+TEST_F(AllanRecordMatlab, ANameThatOccursTwiceIsRefused) {
+    constexpr std::size_t head = 128;
+    const auto bytes_with = [&](std::size_t rows) {
+        {
+            test::MatWriter writer(path());
+            writer.add<double>("x", MAT_C_DOUBLE, MAT_T_DOUBLE, rows, 1, std::vector<double>(rows, 1.0));
+        }
+        std::ifstream in(path(), std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(in), {});
+    };
+    const std::string path = file(bytes_with(3) + bytes_with(4).substr(head), "twice.mat");
+    EXPECT_THAT(error_of(path, "x"),
+                AllOf(HasSubstr("twice.mat"), HasSubstr("/x"), HasSubstr("occurs more than once in the file; rename")));
 }
 
 /// MATLAB 7.3 writes HDF5 behind a block of its own of 512 bytes.

@@ -194,6 +194,19 @@ TEST_F(AllanRecordNumpy, AnArchiveThatUnpacksToFarTooMuchIsRefusedByItsHead) {
                 AllOf(HasSubstr("bomb.npz: dataset /x: unpacks to 1.1e+08 bytes"), HasSubstr("more than 200 times")));
 }
 
+// A request of the name would mean either array. One was read with the layout of the other, behind the end of that.
+TEST_F(AllanRecordNumpy, ANameThatOccursTwiceInAnArchiveIsRefusedIfRequested) {
+    const std::string path = (directory_ / "log.npz").string();
+    test::write_zip(path, {{"x.npy", npy(npy_dictionary("[('a', '<f8')]", "(2,)"), bytes_of<double>({1, 2}))},
+                           {"y.npy", npy(npy_dictionary("'<f8'", "(2,)"), bytes_of<double>({5, 6}))},
+                           {"x.npy", npy(npy_dictionary("'<i4'", "(2,)"), bytes_of<std::int32_t>({3, 4}))}});
+    for (const char* const asked : {"x", "x/a"}) {
+        EXPECT_THAT(error_of(path, asked), AllOf(HasSubstr("log.npz"), HasSubstr("/x"),
+                                                 HasSubstr("occurs more than once in the file; rename or remove one")));
+    }
+    EXPECT_THAT(values(path, "y"), ElementsAre(5.0, 6.0));
+}
+
 TEST_F(AllanRecordNumpy, ArchivesThatAreNoneAreNamed) {
     const std::string path = (directory_ / "log.npz").string();
     test::write_zip(path, {{"a.txt", "hello"}});

@@ -181,6 +181,15 @@ namespace {
 
 }  // namespace
 
+void refuse_repeated(const std::set<std::string>& repeated, Contents& contents) {
+    std::erase_if(contents.datasets, [&](const Dataset& dataset) {
+        const bool is_one = repeated.contains(dataset.dataset);
+        if (is_one)
+            contents.others.push_back({dataset.path, "occurs more than once in the file; rename or remove one"});
+        return is_one;
+    });
+}
+
 std::vector<std::string> names_of_times(const std::string& asked) {
     int depth = 0;
     for (std::size_t i = 0; i < asked.size(); ++i) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,10 @@ struct Choice {
     std::optional<Slice> time;
     std::optional<Slice> nanoseconds;  ///< behind the seconds of `time`, where --time names two
 };
+
+/// Makes datasets unreadable whose name occurs more than once in the file, because a request would mean any of them.
+/// \param repeated  names of these datasets, without those of fields
+void refuse_repeated(const std::set<std::string>& repeated, Contents& contents);
 
 /// The names in `--time SECONDS,NANOSECONDS`; one where there is no comma outside of brackets.
 std::vector<std::string> names_of_times(const std::string& asked);

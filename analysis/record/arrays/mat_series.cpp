@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -98,10 +99,13 @@ void check_mat_size(const std::string& path, const std::string& name, const std:
 Contents variables_of(const std::string& path) {
     const MatFile file = open_mat(path);
     Contents contents;
+    std::set<std::string> names;
+    std::set<std::string> repeated;
     for (;;) {
         const Variable variable(Mat_VarReadNextInfo(file.get()), Mat_VarFree);
-        if (!variable) return contents;
+        if (!variable) break;
         const std::string name = fmt::format("/{}", variable->name != nullptr ? variable->name : "");
+        if (!names.insert(name).second) repeated.insert(name);
         const std::string why = why_not(*variable);
         if (!why.empty()) {
             contents.others.push_back({name, why});
@@ -111,6 +115,8 @@ Contents variables_of(const std::string& path) {
         check_mat_size(path, name, dataset.sides);
         contents.datasets.push_back(std::move(dataset));
     }
+    refuse_repeated(repeated, contents);
+    return contents;
 }
 
 class MatColumn final : public ArrayColumn {

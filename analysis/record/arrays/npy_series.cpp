@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -161,6 +162,7 @@ void refuse_absurd_packing(const std::string& where, const NpyHeader& head, cons
 std::map<std::string, Entry> entries_of(const std::string& path, Contents& contents) {
     constexpr std::string_view ending = ".npy";
     std::map<std::string, Entry> entries;
+    std::set<std::string> repeated;
     const auto zip = std::make_shared<Zip>(path);
     while (zip->next()) {
         std::string name = zip->name();
@@ -175,8 +177,9 @@ std::map<std::string, Entry> entries_of(const std::string& path, Contents& conte
         NpyHeader head = header_of(source, where);
         add_array(head, path, name, zip->bytes(), contents);
         refuse_absurd_packing(where, head, path);
-        entries[name] = {zip->number(), std::move(head)};
+        if (!entries.insert_or_assign(name, Entry{zip->number(), std::move(head)}).second) repeated.insert(name);
     }
+    refuse_repeated(repeated, contents);
     return entries;
 }
 
