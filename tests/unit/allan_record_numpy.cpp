@@ -207,6 +207,12 @@ TEST_F(AllanRecordNumpy, ANameThatOccursTwiceInAnArchiveIsRefusedIfRequested) {
     EXPECT_THAT(values(path, "y"), ElementsAre(5.0, 6.0));
 }
 
+// The second field was read with the type of the first, which may be wider than any number.
+TEST_F(AllanRecordNumpy, AFieldNameThatOccursTwiceIsRefused) {
+    const std::string path = array("[('x', '<f16'), ('x', '<u8')]", "(2,)", std::string(48, '\1'));
+    EXPECT_THAT(error_of(path, "x"), AllOf(HasSubstr("gyro.npy"), HasSubstr("is the name of several fields")));
+}
+
 TEST_F(AllanRecordNumpy, ArchivesThatAreNoneAreNamed) {
     const std::string path = (directory_ / "log.npz").string();
     test::write_zip(path, {{"a.txt", "hello"}});

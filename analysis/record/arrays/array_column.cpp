@@ -10,6 +10,7 @@
 
 #include "analysis/record/arrays/joined_times.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::record {
 namespace {
@@ -90,7 +91,7 @@ SeriesInfo stream_column(const SeriesRequest& request, ArrayColumn& column, Arra
     if (time != nullptr) {
         if (time->length() != column.length()) {
             throw InputError(fmt::format("{} has {} elements, {} has {}; must be as many times as values",
-                                         time->label(), time->length(), column.name(), column.length()));
+                                         time->label(), time->length(), printable(column.name()), column.length()));
         }
         const text::TimeUnit unit = text::time_unit(request.time_unit.value_or("s"));
         rows.set_grid(TimeGrid(

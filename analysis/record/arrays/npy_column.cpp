@@ -156,6 +156,10 @@ void add_array(const NpyHeader& head, const std::string& file, const std::string
             dataset.sides.push_back(field.count);
         }
         std::string why = field.why_not;
+        const auto is_same = [&](const NpyField& other) { return other.name == field.name; };
+        if (std::count_if(head.fields.begin(), head.fields.end(), is_same) > 1) {
+            why = "is the name of several fields; rename them";
+        }
         if (why.empty() && (head.shape.empty() || head.shape.size() > 2)) {
             why = head.shape.empty() ? "is a single value; a series has many"
                                      : fmt::format("has {} dimensions; write one or two of them", head.shape.size());
