@@ -208,9 +208,11 @@ TEST_F(AllanRecordNumpy, ANameThatOccursTwiceInAnArchiveIsRefusedIfRequested) {
 }
 
 // The second field was read with the type of the first, which may be wider than any number.
-TEST_F(AllanRecordNumpy, AFieldNameThatOccursTwiceIsRefused) {
+TEST_F(AllanRecordNumpy, FieldNamesThatOccurTwiceOrAreEmptyAreRefused) {
     const std::string path = array("[('x', '<f16'), ('x', '<u8')]", "(2,)", std::string(48, '\1'));
     EXPECT_THAT(error_of(path, "x"), AllOf(HasSubstr("gyro.npy"), HasSubstr("is the name of several fields")));
+    const std::string nameless = array("[('x', '<f16'), ('', '<u8')]", "(2,)", std::string(48, '\1'));
+    EXPECT_THAT(error_of(nameless), AllOf(HasSubstr("gyro.npy"), HasSubstr("a field without a name")));
 }
 
 TEST_F(AllanRecordNumpy, ArchivesThatAreNoneAreNamed) {

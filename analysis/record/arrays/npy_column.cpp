@@ -160,6 +160,7 @@ void add_array(const NpyHeader& head, const std::string& file, const std::string
         if (std::count_if(head.fields.begin(), head.fields.end(), is_same) > 1) {
             why = "is the name of several fields; rename them";
         }
+        if (field.name.empty() && head.fields.size() > 1) why = "has a field without a name; name it";
         if (why.empty() && (head.shape.empty() || head.shape.size() > 2)) {
             why = head.shape.empty() ? "is a single value; a series has many"
                                      : fmt::format("has {} dimensions; write one or two of them", head.shape.size());
