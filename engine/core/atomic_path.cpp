@@ -180,11 +180,13 @@ std::optional<AtomicPath::Identity> AtomicPath::identity_of(const fs::path& path
     return Identity{status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }
 
-AtomicPath::AtomicPath(const fs::path& target)
-    : target_(resolve(target)),
-      found_(identity_of(target_)),
-      descriptor_(claim(target_, found_.has_value(), partial_)) {
-    remove_on_kill_.emplace(partial_.string());
+AtomicPath::AtomicPath(const fs::path& target) : target_(resolve(target)), found_(identity_of(target_)) {
+    {
+        // A signal that ends the process between the two would leave the file.
+        const HoldEnd hold;
+        descriptor_ = claim(target_, found_.has_value(), partial_);
+        remove_on_kill_.emplace(partial_.string());
+    }
     remove_abandoned(target_);
 }
 

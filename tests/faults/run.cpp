@@ -33,10 +33,14 @@ class RunFaults : public test::ProgramTest {
         return false;
     }
     /// A long run that has claimed its output.
-    pid_t start_long() {
-        const pid_t child = start({"run", "long.toml", "-o", "out.h5", "--threads", "2"});
+    pid_t start_long(const Prepare& prepare = {}) {
+        const pid_t child = start({"run", "long.toml", "-o", "out.h5", "--threads", "2"}, prepare);
         EXPECT_TRUE(soon([&] { return has_partial(); }));
         return child;
+    }
+    /// The folder of the run may be there, without anything finished; the next run takes it over.
+    void expect_no_file() const {
+        for (const std::string& name : left()) EXPECT_TRUE(untouched_.contains(name) || name == "out.h5.parts") << name;
     }
     const std::set<std::string> untouched_ = {"long.toml", "short.toml"};
 };
@@ -75,11 +79,24 @@ TEST_F(RunFaults, ASecondSignalEndsAtOnceAndLeavesNoFile) {
     kill(child, SIGTERM);
     const Outcome r = finish(child);
     EXPECT_TRUE(r.signal == SIGINT || r.signal == SIGTERM) << "status " << r.status;
-    // The folder of the run may be there, without anything finished; the next run takes it over.
-    for (const std::string& name : left()) EXPECT_TRUE(untouched_.contains(name) || name == "out.h5.parts") << name;
+    expect_no_file();
     write("long.toml", short_scenario);
     EXPECT_EQ(run({"run", "long.toml", "-o", "out.h5"}).status, 0);
     EXPECT_FALSE(left().contains("out.h5.parts"));
+}
+
+// The file is there, and the program has not yet seen that it made it.
+TEST_F(RunFaults, ASecondSignalWhileTheFileIsMadeLeavesNoFile) {
+    const pid_t child = start_long([] {
+        setenv("LD_PRELOAD", RINGLOCK_DISK_FAULTS, 1);
+        setenv("RINGLOCK_SLOW_CREATE_MS", "200", 1);
+    });
+    kill(child, SIGINT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    kill(child, SIGTERM);
+    const Outcome r = finish(child);
+    EXPECT_TRUE(r.signal == SIGINT || r.signal == SIGTERM) << "status " << r.status;
+    expect_no_file();
 }
 
 TEST_F(RunFaults, AnInterruptedRunKeepsTheResultOfAnEarlierOne) {

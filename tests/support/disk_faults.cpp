@@ -4,7 +4,7 @@
 // fsync, open, mkdir or rename; the call fails where the path of the file contains PART, after SKIP such calls that
 // succeed, COUNT times (0: for ever). PART may be A!B: the path contains A and not B. RINGLOCK_CLOCK_BACK_S sets the
 // clock of the day back by so many seconds after its hundredth reading. RINGLOCK_SLOW_RMDIR_MS makes rmdir take so
-// many milliseconds.
+// many milliseconds, and RINGLOCK_SLOW_CREATE_MS does so with open where it may make a file.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -92,6 +92,27 @@ Function* next(const char* name) {
     return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
 }
 
+/// Waits as many milliseconds as the variable says; signals do not shorten the wait.
+void wait_as_in(const char* variable) {
+    const char* ms = std::getenv(variable);
+    if (ms == nullptr) return;
+    const long wait_ms = std::atol(ms);
+    timespec left{wait_ms / 1000, wait_ms % 1000 * 1000000};
+    while (nanosleep(&left, &left) != 0 && errno == EINTR) {
+    }
+}
+
+template <class Function>
+int create_or_open(Function* real, const char* path, int flags, mode_t mode) {
+    if ((flags & O_CREAT) == 0) return real(path, flags, mode);
+    if (fails(fault("open", path))) return -1;
+    const int file = real(path, flags, mode);
+    const int error = errno;
+    wait_as_in("RINGLOCK_SLOW_CREATE_MS");
+    errno = error;
+    return file;
+}
+
 time_t set_back() {
     static std::atomic<long> readings = 0;
     const char* back = std::getenv("RINGLOCK_CLOCK_BACK_S");
@@ -128,7 +149,7 @@ int open(const char* path, int flags, ...) {
     va_start(rest, flags);
     const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0;
     va_end(rest);
-    return (flags & O_CREAT) != 0 && fails(fault("open", path)) ? -1 : real(path, flags, mode);
+    return create_or_open(real, path, flags, mode);
 }
 
 int open64(const char* path, int flags, ...) {
@@ -137,7 +158,7 @@ int open64(const char* path, int flags, ...) {
     va_start(rest, flags);
     const mode_t mode = (flags & O_CREAT) != 0 ? va_arg(rest, mode_t) : 0;
     va_end(rest);
-    return (flags & O_CREAT) != 0 && fails(fault("open", path)) ? -1 : real(path, flags, mode);
+    return create_or_open(real, path, flags, mode);
 }
 
 int mkdir(const char* path, mode_t mode) noexcept {
@@ -147,9 +168,7 @@ int mkdir(const char* path, mode_t mode) noexcept {
 
 int rmdir(const char* path) noexcept {
     static auto* real = next<int(const char*)>("rmdir");
-    if (const char* ms = std::getenv("RINGLOCK_SLOW_RMDIR_MS")) {
-        usleep(1000 * static_cast<useconds_t>(std::atol(ms)));
-    }
+    wait_as_in("RINGLOCK_SLOW_RMDIR_MS");
     return real(path);
 }
 
