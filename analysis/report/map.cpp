@@ -43,20 +43,34 @@ std::string block_of(const MapPanel& panel, std::size_t index) {
     return out + "END\n";
 }
 
-/// 1, 2 and 5 of each decade within the range; of a shorter range its ends.
+/// As gnuplot labels its own axes: in plain notation from 1e-4 to 1e5, as m×10^k beyond.
+std::string label_of(double value) {
+    const int decade = static_cast<int>(std::floor(std::log10(value)));
+    if (decade >= -4 && decade < 5) return fmt::format("{:.{}g}", value, std::max(3, decade + 1));
+    return fmt::format("{:.3g}×10^{{{}}}", value / std::pow(10.0, decade), decade);
+}
+
+/// 1, 2 and 5 of each decade within the range; of a long range some of its decades, of a short one its ends.
 std::string colour_tics(const Range& range) {
-    std::string out;
-    int count = 0;
+    constexpr double most_with_three = 3.0;
+    constexpr double most_decades = 10.0;
+    const double decades = std::log10(range.highest) - std::log10(range.lowest);
+    const int step = std::max(1, static_cast<int>(std::ceil(decades / most_decades)));
+    const std::vector<double> digits = decades > most_with_three ? std::vector{1.0} : std::vector{1.0, 2.0, 5.0};
+    std::vector<double> values;
     for (int decade = static_cast<int>(std::floor(std::log10(range.lowest))); std::pow(10.0, decade) <= range.highest;
-         ++decade) {
-        for (const double digit : {1.0, 2.0, 5.0}) {
+         decade += step) {
+        for (const double digit : digits) {
             const double value = digit * std::pow(10.0, decade);
-            if (value < range.lowest || value > range.highest) continue;
-            out += fmt::format("{}'{:.3g}' {}", count++ == 0 ? "" : ", ", value, value);
+            if (value >= range.lowest && value <= range.highest) values.push_back(value);
         }
     }
-    if (count > 1) return out;
-    return fmt::format("'{:.3g}' {}, '{:.3g}' {}", range.lowest, range.lowest, range.highest, range.highest);
+    if (values.size() < 2) values = {range.lowest, range.highest};
+    std::string out;
+    for (const double value : values) {
+        out += fmt::format("{}'{}' {}", out.empty() ? "" : ", ", label_of(value), value);
+    }
+    return out;
 }
 
 std::string row_tics(const std::vector<std::string>& rows) {
@@ -86,7 +100,7 @@ std::string draw_map(const Map& map, const std::string& shown_as) {
     std::string script = fmt::format(
         "set encoding utf8\n"
         "set terminal svg size {},{} fixed enhanced background '#ffffff' font 'Helvetica,Arial,sans-serif,16'\n"
-        "{}set logscale cb\nset cbrange [{}:{}]\nset cbtics ({}) noenhanced\nset cblabel {} noenhanced offset 1,0\n"
+        "{}set logscale cb\nset cbrange [{}:{}]\nset cbtics ({})\nset cblabel {} noenhanced offset 1,0\n"
         "set xrange [{}:{}]\nset yrange [-0.5:{}]\nset ytics ({}) noenhanced\nset xtics nomirror\n"
         "set xlabel {} noenhanced\nset ylabel {} noenhanced\nset border 3 linecolor '#444444'\nunset key\n",
         map_width_px, map_title_px + panels * panel_height_px, palette, colour.lowest, colour.highest,

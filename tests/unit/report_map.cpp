@@ -41,6 +41,26 @@ std::size_t count(const std::string& text, const std::string& what) {
     return n;
 }
 
+/// What the map of two values says, without its cells.
+std::string scale_of(double lowest, double highest) {
+    report::Map map = two_panels();
+    map.rows = {"row"};
+    map.panels = {{.title = "",
+                   .cells = {{.begin = 0.0, .end = 5.0, .row = 0, .value = lowest},
+                             {.begin = 5.0, .end = 10.0, .row = 0, .value = highest}}}};
+    return report::draw_map(map, "map.svg");
+}
+
+// Labels of the colour scale are as those of the other axes, few even where the values go over many decades.
+TEST(ReportMap, LabelsOfColoursAreReadable) {
+    EXPECT_THAT(scale_of(300.0, 6500.0), AllOf(HasSubstr(">500<"), HasSubstr(">1000<"), HasSubstr(">5000<")));
+    EXPECT_THAT(scale_of(300.0, 6500.0), Not(HasSubstr("e+")));
+    EXPECT_THAT(scale_of(2e5, 6e6), AllOf(HasSubstr("2×10"), HasSubstr("5×10"), Not(HasSubstr("e+"))));
+    EXPECT_THAT(scale_of(0.0013, 0.0017), AllOf(HasSubstr(">0.0013<"), HasSubstr(">0.0017<")));
+    EXPECT_THAT(scale_of(0.003, 40.0), AllOf(HasSubstr(">0.01<"), HasSubstr(">10<"), Not(HasSubstr(">0.02<"))));
+    EXPECT_EQ(count(scale_of(1e-12, 1e12), "1×10"), 6U) << "every third of 25 decades, three of them in plain notation";
+}
+
 // Every cell with a value is drawn in its colour; the ends of the scale have those of the palette.
 TEST(ReportMap, CellsHaveTheColoursOfTheirValues) {
     const std::string svg = report::draw_map(two_panels(), "map.svg");
