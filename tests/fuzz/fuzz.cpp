@@ -30,7 +30,8 @@
 // Module and place are enough to say whose code a fault is in; looking up names takes seconds each time. Libraries ask
 // for absurd amounts of memory on damaged files, and leak where they refuse one.
 extern "C" const char* __asan_default_options() {
-    return "allocator_may_return_null=1:max_allocation_size_mb=2000:symbolize=0:detect_leaks=0:handle_abort=1";
+    return "allocator_may_return_null=1:max_allocation_size_mb=2000:symbolize=0:detect_leaks=0:handle_abort=1:"
+           "malloc_context_size=3:quarantine_size_mb=8";
 }
 
 namespace ringlock::fuzz {

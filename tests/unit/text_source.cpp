@@ -5,6 +5,7 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <random>
 #include <string>
 #include <vector>
@@ -149,6 +150,45 @@ TEST(TextLines, EveryEndOfLineIsOne) {
     EXPECT_THAT(message_of<InputError>([&] { lines_of("a\nb\0c\n"s); }),
                 AllOf(HasSubstr("data:2:"), HasSubstr("zero byte")));
     EXPECT_THAT(message_of<InputError>([&] { lines_of(std::string(5 << 20, 'x')); }), HasSubstr("longer than"));
+}
+
+/// Gives a text in pieces of random length, as a pipe does.
+class Pieces final : public Source {
+   public:
+    Pieces(std::string text, std::size_t longest, std::mt19937_64& random)
+        : text_(std::move(text)), longest_(longest), random_(random) {}
+    std::size_t read(char* to, std::size_t size) override {
+        const std::size_t count = std::min({size, 1 + random_() % longest_, text_.size() - given_});
+        text_.copy(to, count, given_);
+        given_ += count;
+        return count;
+    }
+
+   private:
+    std::string text_;
+    std::size_t longest_;
+    std::mt19937_64& random_;
+    std::size_t given_ = 0;
+};
+
+// The buffer grows with the bytes that come: lines of every length around its sizes come back whole.
+TEST(TextLines, ComeBackWholeFromPiecesOfAnyLength) {
+    std::mt19937_64 random(11);
+    for (const std::size_t longest_line : {3U, 300U, 9000U, 70000U, 600000U}) {
+        for (const std::size_t longest_piece : {5U, 4096U, 8192U, 1U << 20}) {
+            if (longest_piece < 100 && longest_line > 1000) continue;  // takes long and shows nothing more
+            std::vector<std::string> wanted;
+            std::string text;
+            while (text.size() < std::max<std::size_t>(20000, 3 * longest_line)) {
+                wanted.emplace_back(1 + random() % longest_line, static_cast<char>('a' + wanted.size() % 26));
+                text += wanted.back() + '\n';
+            }
+            Lines lines(std::make_unique<Pieces>(text, longest_piece, random), "data");
+            std::vector<std::string> found;
+            for (std::string_view line; lines.next(line);) found.emplace_back(line);
+            EXPECT_TRUE(found == wanted) << longest_line << " " << longest_piece;
+        }
+    }
 }
 
 }  // namespace

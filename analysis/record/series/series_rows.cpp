@@ -1,5 +1,7 @@
 #include "analysis/record/series/series_rows.hpp"
 
+#include <algorithm>
+
 #include "engine/core/interrupt.hpp"
 
 namespace ringlock::record {
@@ -37,6 +39,17 @@ void SeriesRows::begin_grid() {
         }
     }
     waiting_.clear();
+}
+
+void SeriesRows::make_room() {
+    if (values_.size() == longest) {
+        flush();
+        return;
+    }
+    // Small files pay for small buffers only.
+    const std::size_t size = std::min(8 * values_.size(), longest);
+    values_.resize(size);
+    counts_.resize(size);
 }
 
 void SeriesRows::flush() {

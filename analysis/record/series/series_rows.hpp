@@ -29,9 +29,9 @@ using TakePiece = std::function<void(const SeriesPiece&)>;
 /// Takes the rows that a reader finds and hands them on in pieces of bounded length, with what is missing between.
 class SeriesRows {
    public:
-    explicit SeriesRows(TakePiece take) : take_(std::move(take)), values_(longest), counts_(longest) {}
+    explicit SeriesRows(TakePiece take) : take_(std::move(take)), values_(first), counts_(first) {}
 
-    static constexpr std::size_t longest = 65536;
+    static constexpr std::size_t longest = 65536;  ///< values of a piece
 
     /// The rows have times; to be called before the first.
     void set_grid(TimeGrid grid) { grid_ = std::move(grid); }
@@ -100,9 +100,12 @@ class SeriesRows {
     void push(double value, std::int64_t count) {
         values_[filled_] = value;
         counts_[filled_] = count;
-        if (++filled_ == longest) flush();
+        if (++filled_ == values_.size()) make_room();
     }
+    void make_room();
     void flush();
+
+    static constexpr std::size_t first = 256;  ///< values that there is room for at the beginning
 
     TakePiece take_;
     std::optional<TimeGrid> grid_;

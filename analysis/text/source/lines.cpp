@@ -10,13 +10,14 @@
 namespace ringlock::text {
 namespace {
 
+constexpr std::size_t first_buffer_bytes = std::size_t{1} << 13;
 constexpr std::size_t buffer_bytes = std::size_t{1} << 18;
 constexpr std::size_t longest_line = std::size_t{1} << 22;
 
 }  // namespace
 
 Lines::Lines(std::unique_ptr<Source> from, std::string name)
-    : from_(std::move(from)), name_(std::move(name)), buffer_(buffer_bytes) {}
+    : from_(std::move(from)), name_(std::move(name)), buffer_(first_buffer_bytes) {}
 
 void Lines::refuse_zeros(std::size_t from, std::size_t count) {
     const void* zero = std::memchr(buffer_.data() + from, '\0', count);
@@ -30,25 +31,32 @@ void Lines::refuse_zeros(std::size_t from, std::size_t count) {
                     name_, line));
 }
 
+void Lines::make_room() {
+    if (filled_ == buffer_.size() && buffer_.size() >= longest_line) {
+        throw InputError(fmt::format("{}:{}: a line is longer than {} bytes; is this a text file?", name_, number_ + 1,
+                                     longest_line));
+    }
+    // A large buffer costs more than reading a small file: it comes with the bytes that the file turns out to have.
+    if (buffer_.size() < buffer_bytes && read_ >= buffer_.size() / 2) {
+        buffer_.resize(std::min(8 * buffer_.size(), buffer_bytes));
+    } else if (filled_ == buffer_.size()) {
+        buffer_.resize(2 * buffer_.size());
+    }
+}
+
 bool Lines::refill() {
     std::memmove(buffer_.data(), buffer_.data() + begin_, filled_ - begin_);
     filled_ -= begin_;
     begin_ = 0;
-    if (filled_ == buffer_.size()) {
-        if (buffer_.size() >= longest_line) {
-            throw InputError(fmt::format("{}:{}: a line is longer than {} bytes; is this a text file?", name_,
-                                         number_ + 1, longest_line));
-        }
-        buffer_.resize(2 * buffer_.size());
-    }
+    make_room();
     const std::size_t got = from_->read(buffer_.data() + filled_, buffer_.size() - filled_);
-    if (first_ && got > 0) {
-        first_ = false;
+    if (read_ == 0 && got > 0) {
         const std::string_view text(buffer_.data(), got);
         if (text.find('\n') == std::string_view::npos && text.find('\r') != std::string_view::npos) end_of_line_ = '\r';
     }
     refuse_zeros(filled_, got);
     filled_ += got;
+    read_ += got;
     return got > 0;
 }
 

@@ -24,6 +24,7 @@ class Lines {
 
    private:
     bool refill();
+    void make_room();
     void refuse_zeros(std::size_t from, std::size_t count);
 
     std::unique_ptr<Source> from_;
@@ -32,8 +33,8 @@ class Lines {
     std::size_t begin_ = 0;   ///< of the bytes that have not been returned
     std::size_t filled_ = 0;  ///< end of the bytes that have been read
     std::size_t number_ = 0;
+    std::size_t read_ = 0;  ///< bytes that the source has given
     char end_of_line_ = '\n';
-    bool first_ = true;
     bool at_end_ = false;
 };
 
