@@ -9,7 +9,9 @@
 #include "analysis/record/readers.hpp"
 #include "analysis/record/series/text_times.hpp"
 #include "analysis/text/numbers.hpp"
+#include "analysis/text/stamps.hpp"
 #include "analysis/text/table.hpp"
+#include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
 
@@ -23,7 +25,19 @@ bool is_identifier(std::string_view key) {
 }
 
 /// Names of columns that hold the times of the rows, the likeliest first.
-constexpr std::array time_names = {"time_s", "time", "t"};
+constexpr std::array time_names = {"time_s", "time", "t", "timestamp"};
+
+/// Whether a column has that name; where `with_unit`, with a unit behind it as in time_ms. A name of one
+/// letter must be plain: T_s may be the temperature of a surface, and t_min the lowest one.
+bool has_time_name(const std::string& column, std::string_view name, bool with_unit) {
+    std::string_view stem = column;
+    if (with_unit) {
+        const auto unit = text::declared_time_unit(column, "");
+        if (!unit || (name.size() == 1 && unit->seconds > 1.0)) return false;
+        stem = stem.substr(0, stem.find_last_of('_'));
+    }
+    return stem == name || (name.size() > 1 && text::lowered(stem) == name);
+}
 
 text::Wanted names_of_records() {
     text::Wanted wanted;
@@ -205,13 +219,15 @@ class CsvReader {
     }
 
     void find_times(bool has_row) {
-        for (const char* name : time_names) {
-            for (const Column& column : columns_) {
-                if (column.name != name || times_) continue;
-                SeriesRequest request;
-                request.time = name;
-                const std::vector<std::string_view> none;
-                times_.emplace(table_.layout(), has_row ? table_.fields() : none, request, path_);
+        for (const bool with_unit : {false, true}) {
+            for (const char* name : time_names) {
+                for (const Column& column : columns_) {
+                    if (times_ || !has_time_name(column.name, name, with_unit)) continue;
+                    SeriesRequest request;
+                    request.time = column.name;
+                    const std::vector<std::string_view> none;
+                    times_.emplace(table_.layout(), has_row ? table_.fields() : none, request, path_);
+                }
             }
         }
     }

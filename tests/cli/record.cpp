@@ -155,6 +155,18 @@ TEST_F(RecordProgram, GapsStayGaps) {
     expect_refused(
         {"validate", "counts.csv"},
         AllOf(HasSubstr("counts.csv:5: column quarter_count: 2 samples are missing"), HasSubstr("0.01 s and 0.04 s")));
+    for (const char* name : {"time_ms", "t_ms", "Timestamp_ms", "timestamp [ms]"}) {
+        write("named.csv", std::string("# rate_hz = 100\n") + name + ",angle_arcsec\n0,1\n10,2\n40,3\n50,3\n60,4\n");
+        r = run({"validate", "named.csv"});
+        EXPECT_EQ(r.status, 0) << r.err;
+        EXPECT_THAT(r.err, HasSubstr("2 samples are missing between 10 ms and 40 ms")) << name;
+    }
+    for (const char* name : {"T_s", "t_min", "runtime_ms"}) {
+        write("named.csv", std::string("# rate_hz = 100\n") + name + ",angle_arcsec\n0,1\n10,2\n40,3\n");
+        r = run({"validate", "named.csv"});
+        EXPECT_EQ(r.status, 0) << r.err;
+        EXPECT_THAT(r.err, HasSubstr("has no meaning in a record and is ignored")) << name;
+    }
     write("ms.csv", "# rate_hz = 100\ntime,angle_arcsec\n0,1\n10,2\n20,3\n");
     expect_refused({"validate", "ms.csv"}, HasSubstr("declare them in the header, as in \"time [ms]\""));
     write("ms.csv", "# rate_hz = 100\ntime [ms];angle_arcsec\n0;1,5\n10;2,5\n20;3,5\n");

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "engine/core/notice.hpp"
 #include "tests/unit/allan_record_support.hpp"
 
 // Series as text: columns, values, what is missing, whole numbers, streams.
@@ -25,6 +26,7 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -231,6 +233,25 @@ TEST_F(AllanRecord, StreamsTextInBoundedPieces) {
     EXPECT_EQ(streamed.info.missing, 150u);
     EXPECT_EQ(streamed.info.column, "x");
     EXPECT_EQ(streamed.info.rate_hz, 5.0);
+}
+
+// A summary below the table is used, and said.
+TEST_F(AllanRecord, WordsBelowAColumnOfNumbersAreNoted) {
+    const auto notes_of = [&](const std::string& text) {
+        std::string notes;
+        set_notice_sink([&](std::string_view said) { notes += said; });
+        const auto series = record::read_series(file(text), "x");
+        set_notice_sink({});
+        EXPECT_GT(series.n, 11U);
+        return notes;
+    };
+    std::string rows = "t,x\n";
+    for (int i = 0; i < 12; ++i) rows += fmt::format("{}.5,{}\n", i, i);
+    EXPECT_EQ(notes_of(rows + "nan,3\n,4\n-1,5\n"), "");
+    EXPECT_THAT(notes_of(rows + "Mean,5\nStd,3\n"),
+                AllOf(HasSubstr(":14: column t has 'Mean' where all rows above it have numbers"), HasSubstr("Cut off"),
+                      Not(HasSubstr("Std"))));
+    EXPECT_EQ(notes_of("t,x\nA7,1\n" + rows.substr(4) + "Mean,5\n"), "") << "a column of names";
 }
 
 // Whatever the bytes are: a series that adds up, or an error that names the file.

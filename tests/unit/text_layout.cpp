@@ -159,6 +159,12 @@ TEST(TextLayout, HeadersWithUnits) {
     EXPECT_EQ(read("# rate_hz = 3\n1 2 3\n").layout.has_header, false);
 }
 
+TEST(TextLayout, ARowOfAWordAndAOneIsNoRowOfUnits) {
+    EXPECT_THAT(read("state,x\nN,1\nC,0.5\nN,0.25\n").rows,
+                ElementsAre(Row{"N", "1"}, Row{"C", "0.5"}, Row{"N", "0.25"}));
+    EXPECT_THAT(read("t,x,n\ns,deg/s,1\n0,0.5,2\n1,0.25,3\n").units, ElementsAre("s", "deg/s", ""));
+}
+
 TEST(TextLayout, PreamblesAreLeftAside) {
     std::string long_one;
     for (int i = 0; i < 30000; ++i)
@@ -216,6 +222,24 @@ TEST(TextLayout, OptionsDecide) {
     for (const char* word : {"commas", "1", "-", "#", "", "\""}) {
         Options other;
         EXPECT_THAT(message_of<InputError>([&] { set_delimiter(other, word); }), HasSubstr("--delimiter")) << word;
+    }
+}
+
+// A comma cannot be both. Zeros in front of whole numbers alone are no fault: counters are padded so.
+TEST(TextLayout, DecimalCommasBetweenCommasAreRefused) {
+    const std::string rows = "0,000,0,012\n0,005,-0,003\n0,010,1,250\n";
+    const auto refused = [](const std::string& text) { return message_of<InputError>([&] { read(text); }); };
+    EXPECT_THAT(refused(rows), AllOf(HasSubstr("data:1: commas seem"), HasSubstr("4 whole numbers"),
+                                     HasSubstr("by semicolons or tabs"), HasSubstr("--delimiter comma")));
+    EXPECT_THAT(refused("t,x\n0,000,0,012\n0,005,1,250\n"), HasSubstr("data:2: commas seem"));
+    EXPECT_THAT(refused("0,012\n-0,003\n"), HasSubstr("Put the name of the column above"));
+    EXPECT_THAT(read("x\n0,012\n-0,003\n").rows, ElementsAre(Row{"0,012"}, Row{"-0,003"}));
+    Options options;
+    set_delimiter(options, "comma");
+    EXPECT_EQ(read(rows, options).rows.front(), (Row{"0", "000", "0", "012"}));
+    for (const char* good : {"0,0007\n1,0008\n", "-0,12\n3,4\n", "-0,0.05\n1,2\n",
+                             "a,b,c,d\n0,000,0,012\n0,005,-0,003\n", "-0,05,1\n0,06,2\n", "-0,-05\n1,2\n"}) {
+        EXPECT_NO_THROW(read(good)) << good;
     }
 }
 

@@ -37,6 +37,7 @@ class TextSeries {
         if (!columns().empty()) choose(more);
         for (; more; more = table_.next()) {
             if (times_) rows_.time(times_->of(table_), table_.line());
+            watch_first_column();
             rows_.line(table_.line());
             value(table_.fields()[value_column_]);
         }
@@ -92,6 +93,26 @@ class TextSeries {
         if (number == value_column_ + 1 || number < 1 || number > columns().size()) return;
         notice(fmt::format("note: {}: {} is taken for the name of column {}, not for the number of column {}", file_,
                            *request_.column, value_column_ + 1, number));
+    }
+
+    /// A first column of numbers in which a word stands, as in "Mean,0.12" below a table.
+    void watch_first_column() {
+        if (first_is_watched_ && value_column_ > 0) watch(table_.fields().front());
+    }
+    void watch(std::string_view field) {
+        constexpr std::size_t enough = 10;
+        const bool is_digit = !field.empty() && field.front() >= '0' && field.front() <= '9';
+        double number = 0.0;
+        if (is_digit || text::parse_value(field, number, table_.layout().dialect.decimal_comma)) {
+            ++first_numbers_;
+            return;
+        }
+        first_is_watched_ = false;
+        if (first_numbers_ < enough || request_.text.quiet || (times_ && times_->has(0))) return;
+        notice(fmt::format(
+            "warning: {}: column {} has '{}' where all rows above it have numbers; a summary or another table "
+            "may begin there, and its values are used. Cut off what is no data",
+            place(table_.line()), text::shown(columns().front().heading), text::shown(field)));
     }
 
     void value(std::string_view field) {
@@ -161,8 +182,10 @@ class TextSeries {
     std::string column_;
     std::optional<double> rate_hz_;
     std::size_t value_column_ = 0;
-    bool only_whole_ = true;  ///< no value so far that was no whole number, be it too large
-    std::string too_large_;   ///< message about the first value that is too large
+    bool first_is_watched_ = true;
+    std::size_t first_numbers_ = 0;  ///< rows whose first column has a number
+    bool only_whole_ = true;         ///< no value so far that was no whole number, be it too large
+    std::string too_large_;          ///< message about the first value that is too large
 };
 
 }  // namespace

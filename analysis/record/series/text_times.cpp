@@ -118,6 +118,13 @@ text::Stamp TextTimes::of_two(const text::Table& table) const {
         fail(table, 1, fmt::format("'{}' is not a number of nanoseconds", text::shown(second)));
     }
     const double value = nanoseconds.value();
+    if (value != std::nearbyint(value) && !std::isnan(value)) {
+        fail(table, 1,
+             fmt::format("is {}, no whole number of nanoseconds; of two columns of times the first must hold seconds "
+                         "or dates, the second nanoseconds or times of day. Where the second is a time by itself, name "
+                         "it alone",
+                         text::shown(second)));
+    }
     if (value < 0.0 || value >= in_a_second) {
         fail(table, 1,
              fmt::format("is {}; nanoseconds next to a column of seconds must be from 0 to 999999999",

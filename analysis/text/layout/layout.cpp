@@ -42,6 +42,7 @@ class Finder {
                 break;
         }
         if (first_ < candidates_.lines.size()) out_.first_line = candidates_.numbers[first_];
+        refuse_decimal_commas_between_commas();
         if (out_.columns.empty() && out_.first_line > 0) number_columns();
         note_dialect();
         return std::move(out_);
@@ -66,6 +67,40 @@ class Finder {
         }
         note(fmt::format("columns are taken to be separated by {}{}; --delimiter overrides this", name_of(d),
                          d.decimal_comma ? ", and commas in numbers for decimal commas" : ""));
+    }
+
+    /// Numbers such as -0,05 with commas between them look like twice as many whole numbers. Whole numbers that begin
+    /// with 0 are digits behind a comma where others are -0, or where a line above has half as many names.
+    void refuse_decimal_commas_between_commas() {
+        const Dialect& d = evidence_.dialect;
+        if (options_.delimiter || d.delimiter != ',' || d.decimal_comma) return;
+        if (out_.has_header || evidence_.columns % 2 != 0) return;
+        constexpr std::size_t enough = 200;
+        const std::size_t end = std::min(candidates_.lines.size(), first_ + enough);
+        std::size_t minus_zero = end;
+        std::size_t padded = end;
+        for (std::size_t i = first_; i < end; ++i) {
+            const auto& fields = row(i);
+            if (fields.size() != evidence_.columns) return;
+            for (std::size_t k = 0; k < fields.size(); k += 2) {
+                const bool minus = fields[k].starts_with('-');
+                std::size_t whole = 0;
+                std::size_t digits = 0;
+                if (!parse_index(fields[k].substr(minus ? 1 : 0), whole) || !parse_index(fields[k + 1], digits)) return;
+                if (minus && whole == 0) minus_zero = std::min(minus_zero, i);
+                if (fields[k + 1].size() > 1 && fields[k + 1].front() == '0') padded = std::min(padded, i);
+            }
+        }
+        const bool half_as_many_names =
+            first_ > 0 && 2 * divider_.divide(candidates_.lines[first_ - 1], true).size() == evidence_.columns;
+        if (padded == end || (minus_zero == end && !half_as_many_names)) return;
+        fail(candidates_.numbers[padded],
+             fmt::format(
+                 "commas seem to be decimal commas as well as between the columns: the line has {} whole numbers, "
+                 "some of which begin with 0. {}; where they are whole numbers, say --delimiter comma",
+                 evidence_.columns,
+                 evidence_.columns == 2 ? "Put the name of the column above the numbers"
+                                        : "Separate the columns by semicolons or tabs"));
     }
 
     void number_columns() {
@@ -103,15 +138,17 @@ class Finder {
         }
     }
 
+    /// Whether the cells are units, or say that there is none. A row of more ones than units is data: "N,1".
     bool is_units(std::string_view line) const {
-        const std::vector<std::string> cells = headings_of(line);
-        bool any = false;
-        for (const std::string& cell : cells) {
+        std::size_t units = 0;
+        std::size_t ones = 0;
+        for (const std::string& cell : headings_of(line)) {
             const auto unit = unit_cell(cell);
             if (!unit) return false;
-            any = any || !unit->empty();
+            if (!unit->empty()) ++units;
+            if (trimmed(cell) == "1") ++ones;
         }
-        return any;
+        return units > ones;
     }
 
     void take_units(std::size_t candidate) { take_units(candidates_.lines[candidate]); }
