@@ -48,6 +48,7 @@ PLACEHOLDER = re.compile(
 QUOTED = re.compile(r"('[^']*'|\"[^\"]*\")")
 OUTPUT_OPTIONS = {"-o", "--output", "--plot", "--csv", "--psd", "--map"}
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+NO_ENTRY = "{} has no entry [[tool]] in tests/docs/commands.toml: a quick mode, or why it has none"
 REFERENCE = "docs/commands.md"  # the page that lists all options of every command
 LANGUAGES_OF_COMMANDS = {"", "sh", "bash", "console", "shell"}
 
@@ -466,6 +467,8 @@ def check_tool(runner, command):
         return
     if path.suffix:  # a list or a module
         return
+    if runner.manifest.tool(words[0]) is None:
+        runner.fail(command, NO_ENTRY.format(words[0]))
     if not os.access(path, os.X_OK):
         runner.fail(command, f"{words[0]} is not executable")
     text = path.read_text(encoding="utf-8")
@@ -485,7 +488,7 @@ def run_tools(runner, commands):
             continue
         entry = runner.manifest.tool(name)
         if entry is None:
-            runner.fail(place, f"{name} has no entry [[tool]] in tests/docs/commands.toml: a quick mode, or why it has none")
+            runner.fail(place, NO_ENTRY.format(name))
             continue
         if "quick" not in entry:
             print(f"not run: {name}: {entry['reason']}")

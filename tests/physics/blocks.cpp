@@ -85,7 +85,7 @@ TEST(GyroBlock, FollowsARampLikeTheDirectIntegrator) {
     for (const std::string arm : {"uncompensated", "noise_injected"}) expect_agreement(scenario, arm, 300);
 }
 
-TEST(GyroBlock, FollowsAStepBetweenTwoPiecesLikeTheDirectIntegrator) {
+TEST(LongGyroBlock, FollowsAStepBetweenTwoPiecesLikeTheDirectIntegrator) {
     // The half cycle under way when the tables are made anew has the old rate, its second half is gone through by the
     // new tables.
     auto scenario = quiet();

@@ -36,7 +36,7 @@ std::map<std::string, double> deviations_deg_h(const std::string& device, const 
     return out;
 }
 
-TEST(DriveCompensation, TheTurnMapIsInvertedWhileTheAmplitudeChanges) {
+TEST(LongDriveCompensation, TheTurnMapIsInvertedWhileTheAmplitudeChanges) {
     // From the first turn on, at which neither amplitude nor rate is known.
     for (const char* device : {"triangle-20mm", "triangle-51mm"}) {
         auto deviation = deviations_deg_h(device, "ideal", "drive", 8.0);

@@ -198,7 +198,7 @@ TEST(TurnOns, RepeatabilityLeavesOutWhatDiffersBetweenGyros) {
     EXPECT_GT(scatter.back().scatter.sd_deg_h, 100.0);
 }
 
-TEST(DecidingKeys, TheThresholdDecidesTheRandomWalkAndTheCalibrationTheCompensated) {
+TEST(LongDecidingKeys, TheThresholdDecidesTheRandomWalkAndTheCalibrationTheCompensated) {
     // Randomised turns have a random walk in proportion to the threshold, and the lock-in that a compensator with a
     // wrong threshold leaves goes with the error of the threshold.
     scenario::Scenario s;

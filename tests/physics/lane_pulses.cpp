@@ -139,7 +139,7 @@ double worst_acceleration(double rate_deg_h, double asymmetry, double threshold_
     return worst;
 }
 
-TEST(LaneReadout, AccelerationsAreThoseOfThePathsPulses) {
+TEST(LongLaneReadout, AccelerationsAreThoseOfThePathsPulses) {
     // Twice the error of the times over an interval of 12 us at least.
     for (const double threshold_deg_h : {30.0, 2000.0}) {
         for (const double rate_deg_h : {100.0, 5000.0}) {

@@ -84,7 +84,7 @@ TEST(Limits, ACouplingPhaseThatIsNotToldLeavesARate) {
     EXPECT_LT(standard_error, 0.02 * std::abs(expected));
 }
 
-TEST(Limits, TheAdaptiveCompensatorIsWithinATenthOfTheExactOne) {
+TEST(LongAdaptiveLimit, TheAdaptiveCompensatorIsWithinATenthOfTheExactOne) {
     scenario::Scenario scenario = what_limits({limits::exact_arm});
     scenario.ensemble.gyros = 32;
     scenario.ensemble.duration_s = 1000.0;

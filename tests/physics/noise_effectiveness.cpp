@@ -60,7 +60,7 @@ TEST(NoiseEffectiveness, WhatIndependentTurnsLeaveIsPredicted) {
     expect_prediction_holds(noisy("gao-deng-2007", 1.0, "turn_phase_rms_rad = 1.5\n"));
 }
 
-TEST(NoiseEffectiveness, HeldNoiseOfEveryDistributionIsPredicted) {
+TEST(LongNoiseEffectiveness, HeldNoiseOfEveryDistributionIsPredicted) {
     const std::string drive = "model = \"drive\"\nturn_phase_rms_rad = 3.0\n";
     expect_prediction_holds(noisy("gao-deng-2007", 1.0, drive + "resonator_q = 100.0\n"));
     expect_prediction_holds(

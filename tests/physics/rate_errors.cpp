@@ -145,7 +145,7 @@ double deg_h_of_rad_per_cycle(double rad) { return rad * 0.5 / units::two_pi * p
 
 constexpr std::int64_t minute_cycles = 64 * 117;  // 60 s
 
-TEST(DeadBand, NoneIsLeftBehindTheExactCompensator) {
+TEST(LongDeadBand, NoneIsLeftBehindTheExactCompensator) {
     // A gyro whose output stood still would be wrong by its input. Uncompensated, all of them do below 0.1 deg/h.
     for (const double asymmetry : {0.0, 1e-3}) {
         for (const double rate : {0.0, 1e-5, 2e-5, 1e-4, 3e-4, 1e-3, 1e-2, 0.1, 1.0, 2.6, 2.7, 3.1}) {
@@ -243,7 +243,7 @@ double misplaced_pulses_deg_h() {
     return -deg_h_of_rad_per_cycle(gyro::turn_kick_rad(paper_device()) * read_rad / std::sqrt(2.0));
 }
 
-TEST(BiasBehindInjectedNoise, AnAsymmetricDitherLeavesNoneBehindTheInstrument) {
+TEST(LongBiasBehindInjectedNoise, AnAsymmetricDitherLeavesNoneBehindTheInstrument) {
     constexpr double asymmetry = 0.01;
     const double misplaced = asymmetry * misplaced_pulses_deg_h();
     std::printf("pulses taken for those of one extremum would leave %.3g deg/h\n", misplaced);
@@ -282,7 +282,7 @@ TEST(BiasBehindInjectedNoise, AnAsymmetricDitherLeavesNoneBehindTheInstrument) {
     }
 }
 
-TEST(BiasBehindInjectedNoise, ADetectorOffsetLeavesKappaOverTheRootOfTwoACycle) {
+TEST(LongBiasBehindInjectedNoise, ADetectorOffsetLeavesKappaOverTheRootOfTwoACycle) {
     const double kappa = gyro::turn_kick_rad(paper_device());
     const auto scenario = quiet(scenario::ReadoutModel::latched);
     for (const char* arm : {"noise_injected+compensated", "noise_injected+compensated_exact"}) {

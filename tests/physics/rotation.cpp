@@ -118,7 +118,7 @@ TEST(Rotation, TheLiftIsThatOfTheUnwrappedPhase) {
     }
 }
 
-TEST(Rotation, ALongSimulationStaysWithinAFringe) {
+TEST(LongRotation, ALongSimulationStaysWithinAFringe) {
     // |F^N(psi) - psi - N rho| < 2 pi for any map of the circle that keeps order, N as large as one likes.
     constexpr int cycles = 15'000;
     std::vector<double> rates = {0.0, 1.0, 2.6, 2.64, 2.65, 2.7, 15.0, 40.0, 59.0, 200.0, 5000.0, 50000.0};

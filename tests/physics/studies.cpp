@@ -182,7 +182,7 @@ TEST(Scenarios, TheStaircaseIsTheOneOfTheClosedForm) {
     }
 }
 
-TEST(Scenarios, TheRateSweepShortensToItsAnswer) {
+TEST(LongScenarios, TheRateSweepShortensToItsAnswer) {
     scenario::Scenario scenario = from_file("rate-sweep.toml");
     EXPECT_EQ(scenario.input.rate_deg_h, -10.0);
     EXPECT_EQ(scenario.input.sweep_stop_deg_h, 500.0);

@@ -137,7 +137,7 @@ TEST(ReplayProperty, IsTheGyroOfTheStudy) {
     }
 }
 
-TEST(ReplayProperty, IsTheGyroOfTheStudyWhateverTheDriveDoes) {
+TEST(LongReplayProperty, IsTheGyroOfTheStudyWhateverTheDriveDoes) {
     const std::vector<std::function<void(Scenario&)>> changes = {
         [](Scenario& s) {  // amplitudes that grow over half cycles
             s.noise_injection.model = scenario::NoiseModel::drive;

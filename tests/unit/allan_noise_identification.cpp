@@ -32,7 +32,7 @@ double share_told(const test::Truth& truth, std::int64_t m, int alpha, std::uint
 // What the test between octaves goes by: 2/sqrt(n) for the white noises (Riley and Greenhall: a lag-1 correlation r of
 // independent samples has variance 1/n, the exponent is 2 - 2d - 2r/(1 + r)), 2.8/sqrt(n) for flicker, by simulation.
 // 1000 records know a standard deviation to 2.2 %: three standard errors.
-TEST(NoiseIdentification, ErrorsOfExponentsAreThoseOfTheirPoints) {
+TEST(LongNoiseIdentification, ErrorsOfExponentsAreThoseOfTheirPoints) {
     struct Case {
         test::Truth truth;
         double deviation;

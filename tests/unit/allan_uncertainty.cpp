@@ -30,7 +30,7 @@ TEST(WeightedSquares, OfEqualWeightsAreChiSquared) {
 }
 
 // Any others against draws, whose error is 0.0016.
-TEST(WeightedSquares, QuantilesAreThoseOfDraws) {
+TEST(LongWeightedSquares, QuantilesAreThoseOfDraws) {
     const std::vector<std::vector<WeightedSquares::Share>> cases = {{{1.0}, {0.3}, {0.1}},
                                                                     {{5.0}, {1.0, 20.0}},
                                                                     {{1.0}, {0.9}, {0.2, 3.0}, {0.01, 100.0}},

@@ -234,7 +234,7 @@ TEST(SimulatedRecord, AStudySeesTheSameProfileAndAmplitudes) {
 }
 
 // The turn map, whose tables must follow amplitudes and rates, against every fringe integrated.
-TEST(SimulatedRecord, TurnMapAndDirectIntegrationAgree) {
+TEST(LongSimulatedRecord, TurnMapAndDirectIntegrationAgree) {
     Scenario s = short_run();
     s.ensemble.duration_s = 3.0;
     s.input.profile_time_s = {0.0, 3.0};

@@ -87,7 +87,7 @@ void expect_resolved_text_parses_back(int scenarios) {
     EXPECT_GT(kept, scenarios * 3 / 7) << "the scenarios are hardly random";
 }
 
-TEST(ScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) { expect_resolved_text_parses_back(150); }
+TEST(ScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) { expect_resolved_text_parses_back(60); }
 TEST(LongScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) { expect_resolved_text_parses_back(3000); }
 
 /// Parses or refuses with a message; anything else fails the test.

@@ -219,7 +219,7 @@ TEST(ClosureEquation, RefusesADriveThatDoesNotReverse) {
     EXPECT_THROW(find_extremum(plain_device(), half, half, 1.0, same(0.0), {}, at), ringlock::RunError);
 }
 
-TEST(ClosureEquation, LocksWithinBesselsHalfWidth) {
+TEST(LongClosureEquation, LocksWithinBesselsHalfWidth) {
     // To first order in Omega_L the mean phase obeys Adler's equation with half-width Omega_L |J_0(M)|. J_0 by its
     // asymptotic form, good to 1/(8 M) here. Second order moves M by 0.001 rad at this threshold.
     const double threshold = 100.0;
@@ -252,7 +252,7 @@ TEST(ClosureEquation, LocksWithinBesselsHalfWidth) {
     }
 }
 
-TEST(ClosureEquation, RandomisedTurnsWalkByTheFormula) {
+TEST(LongClosureEquation, RandomisedTurnsWalkByTheFormula) {
     // ARW = Omega_L sqrt(K/(2 pi Omega_D)). Over n turns read at turns of the same kind n - 1/2 kicks' variances add
     // up.
     constexpr std::size_t n = 10;

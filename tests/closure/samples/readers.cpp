@@ -198,7 +198,7 @@ TEST(SampleReaders, ADitherThatWasLeftIsNamed) {
 
 // A notch takes off the line of the dither and leaves its injected noise, which varies over a half cycle: at the turns
 // it is that of the scenario, 3 rad.
-TEST(SampleReaders, TheNoiseOfADitherThatANotchLeavesIsNoEffect) {
+TEST(LongSampleReaders, TheNoiseOfADitherThatANotchLeavesIsNoEffect) {
     scenario::Scenario s = samples_at(100.0, 60.0);
     s.dither.frequency_hz = 390.444;
     s.reader.stripping = Stripping::notch;
@@ -260,7 +260,7 @@ TEST(LongSampleReaders, AHarmonicAliasedNextToTheDitherIsAccountedFor) {
     }));
 }
 
-TEST(SampleReaders, BesideTheDitherOfANoisyDriveNothingElseIsNamed) {
+TEST(LongSampleReaders, BesideTheDitherOfANoisyDriveNothingElseIsNamed) {
     scenario::Scenario s = samples_at(400.0, 25.0);
     s.reader.stripping = Stripping::none;
     s.reader.fraction = reader::Fraction::detectors;

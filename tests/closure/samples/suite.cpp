@@ -173,7 +173,7 @@ void expect_unexplained(const record::Record& record, ringlock::closure::Where w
 }
 
 // A bias of two states, 3 deg/h apart, was called bias_instability, and one that jumps four times a random walk.
-TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
+TEST(LongClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
     SampleTruth often = short_record(5);
     often.rates.telegraph_bias = {3.0, 20.0};
     SampleTruth seldom = short_record(61);
@@ -379,7 +379,7 @@ TEST(SampleSteps, AreCountedAsABrownianBridge) {
 
 // Searches are counted as what they are worth: in noise alone each p-value is as rare as it says. Three standard errors
 // above; a count ten times too large would leave none.
-TEST(SampleLines, CountTheirSearches) {
+TEST(LongSampleLines, CountTheirSearches) {
     constexpr int records = 100;
     constexpr double p = 0.1;
     std::mt19937_64 random(3);

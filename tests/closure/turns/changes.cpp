@@ -165,7 +165,7 @@ TEST(Chance, TheBoundOfDaviesHoldsForSeveralDegreesOfFreedom) {
     }
 }
 
-TEST(TurnModel, FollowsACouplingThatHops) {
+TEST(LongTurnModel, FollowsACouplingThatHops) {
     const Truth truth = hopping(1500);
     const record::Record record = generate({&truth, 1}).front();
     const Read read(record);

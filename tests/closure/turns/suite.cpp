@@ -371,7 +371,7 @@ TEST(LongClosureSuite, TwoRatesAreNotOneRandomRate) {
         << outcome.verdict << " " << outcome.named;
 }
 
-TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
+TEST(LongClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
     // Without injected noise there are two: a little of it, or none. Records in which a climb alone stays on the lower
     // one, by 5 and 21.
     for (const std::uint64_t seed : {363U, 368U}) {
