@@ -101,9 +101,10 @@ class TextSeries {
     }
     void watch(std::string_view field) {
         constexpr std::size_t enough = 10;
-        const bool is_digit = !field.empty() && field.front() >= '0' && field.front() <= '9';
+        const std::size_t sign = field.starts_with('-') || field.starts_with('+') ? 1 : 0;
+        const bool begins_number = field.size() > sign && field[sign] >= '0' && field[sign] <= '9';
         double number = 0.0;
-        if (is_digit || text::parse_value(field, number, table_.layout().dialect.decimal_comma)) {
+        if (begins_number || text::parse_value(field, number, table_.layout().dialect.decimal_comma)) {
             ++first_numbers_;
             return;
         }
