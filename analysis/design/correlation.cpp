@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "engine/core/dense.hpp"
 #include "engine/core/error.hpp"
@@ -75,14 +75,14 @@ GaussianCopula::GaussianCopula(std::span<const Factor> factors, std::span<const 
         matrix(i, j) = matrix(j, i) = normal_score_correlation(c.value, of);
     }
     const dense::SymmetricEigen eigen = dense::symmetric_eigen(matrix);
-    const Eigen::LLT<Eigen::MatrixXd> cholesky(matrix);
-    if (eigen.values[0] < least_eigenvalue || cholesky.info() != Eigen::Success) {
+    const std::optional<Eigen::MatrixXd> factor = dense::cholesky(matrix);
+    if (eigen.values[0] < least_eigenvalue || !factor) {
         throw InputError(
             fmt::format("the correlations of {} contradict each other: no factors can have them all (the "
                         "smallest eigenvalue of their matrix is {:.3g} and must be above 0); bring them nearer to 0",
                         contradicting(factors, eigen.vectors.col(0)), eigen.values[0]));
     }
-    factor_ = cholesky.matrixL();
+    factor_ = *factor;
     for (Eigen::Index i = 0; i < n; ++i) {
         depends_[static_cast<std::size_t>(i)] = (factor_.row(i).head(i).array() != 0.0).any() ? 1 : 0;
     }

@@ -7,6 +7,7 @@
 
 #include "engine/core/error.hpp"
 #include "engine/core/json_text.hpp"
+#include "engine/core/read_json.hpp"
 #include "engine/core/version.hpp"
 #include "engine/scenario/text/differences.hpp"
 #include "engine/scenario/text/parse.hpp"
@@ -60,7 +61,7 @@ std::string to_json(const Manifest& manifest) {
 }
 
 Manifest parse_manifest(std::string_view text, std::string_view from) try {
-    const auto json = nlohmann::json::parse(text);
+    const auto json = parse_json(text);
     if (json.at("format") != format_name) throw InputError(fmt::format("{}: is not a part of a run of ringlock", from));
     if (json.at("format_version") != format_version) {
         throw InputError(fmt::format("{}: is of another version of ringlock (format {}, here {})", from,

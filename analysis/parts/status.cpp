@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
@@ -11,6 +12,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/json_text.hpp"
 #include "engine/core/printable.hpp"
+#include "engine/core/read_json.hpp"
 #include "engine/core/system_text.hpp"
 
 namespace ringlock::parts {
@@ -43,7 +45,7 @@ void write_status(const std::filesystem::path& folder, const Status& status) {
 std::optional<Status> read_status(const std::filesystem::path& folder) try {
     std::ifstream in(folder / status_name);
     if (!in) return std::nullopt;
-    const auto json = nlohmann::json::parse(in);
+    const auto json = parse_json(std::string(std::istreambuf_iterator<char>(in), {}));
     Status status;
     status.process = json.at("process");
     status.time_utc = json.at("time_utc");

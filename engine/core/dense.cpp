@@ -15,6 +15,16 @@ Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& a) {
 
 bool is_positive(const Eigen::MatrixXd& a) { return a.ldlt().isPositive(); }
 
+std::optional<Eigen::MatrixXd> cholesky(const Eigen::MatrixXd& a) {
+    const Eigen::LLT<Eigen::MatrixXd> factors(a);
+    if (factors.info() != Eigen::Success) return std::nullopt;
+    return factors.matrixL();
+}
+
+Eigen::VectorXd solve_transposed(const Eigen::MatrixXd& l, const Eigen::VectorXd& b) {
+    return l.transpose().triangularView<Eigen::Upper>().solve(b);
+}
+
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& a) { return a.inverse(); }
 
 Eigen::MatrixXd least_squares(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 
 /// Decompositions of dense matrices by Eigen, compiled once: each of them takes seconds of compilation in a source that
 /// uses it directly. Matrices of a fixed small size, in loops where an allocation counts, call Eigen themselves.
@@ -12,6 +13,11 @@ Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::VectorXd&
 Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& a);
 /// Whether the symmetric matrix has no negative eigenvalue, by the pivots of its LDL^T decomposition.
 bool is_positive(const Eigen::MatrixXd& a);
+
+/// Lower factor L of a symmetric positive definite a = L L^T; nothing where a is not positive definite.
+std::optional<Eigen::MatrixXd> cholesky(const Eigen::MatrixXd& a);
+/// Solution of l^T x = b for a regular lower triangular l.
+Eigen::VectorXd solve_transposed(const Eigen::MatrixXd& l, const Eigen::VectorXd& b);
 
 /// Inverse of a regular matrix (LU with row pivots).
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& a);

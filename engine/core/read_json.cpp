@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -24,6 +25,8 @@ std::string words_of(const nlohmann::json::exception& error) {
 
 }  // namespace
 
+nlohmann::json parse_json(std::string_view text, bool throws) { return nlohmann::json::parse(text, nullptr, throws); }
+
 double number_or_nan(const nlohmann::json& value) {
     return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }
@@ -39,7 +42,7 @@ void read_json(const std::filesystem::path& file, std::string_view expected,
                                      std::generic_category().message(reason), expected));
     }
     try {
-        value = nlohmann::json::parse(in);
+        value = parse_json(std::string(std::istreambuf_iterator<char>(in), {}));
     } catch (const nlohmann::json::exception& error) {
         throw InputError(fmt::format("{}: is no JSON: {}; expected is {}", printable(file), words_of(error), expected));
     }

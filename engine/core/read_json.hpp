@@ -7,6 +7,10 @@
 
 namespace ringlock {
 
+/// Parses a text of JSON: the parser's templates take seconds of compilation in a source that uses them directly. Where
+/// the text is no JSON: nlohmann::json::parse_error, or without `throws` a value of which is_discarded() is true.
+nlohmann::json parse_json(std::string_view text, bool throws = true);
+
 /// A number, or NaN for the null that stands for a number that is not finite. Throws nlohmann::json::type_error.
 double number_or_nan(const nlohmann::json& value);
 

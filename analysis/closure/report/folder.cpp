@@ -21,6 +21,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/json_text.hpp"
 #include "engine/core/printable.hpp"
+#include "engine/core/read_json.hpp"
 
 namespace ringlock::closure {
 namespace {
@@ -38,7 +39,7 @@ std::string text_of(const fs::path& path) {
 
 /// Whether the text is an object of to_json(), of a record or of a data chain, in the form in which it is written.
 bool is_closure_json(const std::string& text) {
-    const auto object = nlohmann::json::parse(text, nullptr, false);
+    const auto object = parse_json(text, false);
     if (!object.is_object()) return false;
     const auto has = [&](std::initializer_list<const char*> keys) {
         return std::all_of(keys.begin(), keys.end(), [&](const char* key) { return object.contains(key); });

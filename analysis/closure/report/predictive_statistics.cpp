@@ -14,6 +14,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/noise/model/spectrum.hpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 
@@ -132,7 +133,7 @@ void fold(const record::Turns& turns, const std::vector<double>& phase_rad, cons
     Eigen::Matrix<double, columns, columns> scaled = scale.asDiagonal() * normal * scale.asDiagonal();
     // Phases without noise may make several columns collinear: the solution is then a compromise between them.
     scaled.diagonal().array() += 1e-10;
-    const Row size = scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * right);
+    const Row size = scale.cwiseProduct(Row(dense::solve_symmetric(scaled, scale.cwiseProduct(right))));
     for (std::size_t direction = 0; direction < 2; ++direction) {
         Curve& curve = curves.emplace_back();
         const Eigen::Index first = direction == 0 ? 0 : each;

@@ -307,9 +307,10 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
             information(2, 2) += 2.0 * static_cast<double>(rest.size());
         }
     }
-    const Eigen::LLT<Eigen::MatrixXd> root(information);
+    // The identity makes it positive definite, unless a derivative is not finite.
+    const Eigen::MatrixXd root = dense::cholesky(information).value_or(Eigen::MatrixXd::Identity(size, size));
     const auto logarithms = [&](const Objective::Point& at) -> Eigen::VectorXd {
-        return from + root.matrixU().solve(at);
+        return from + dense::solve_transposed(root, at);
     };
     const auto values = [&](const std::vector<Objective::Point>& points) {
         std::vector<TurnParameters> changed;
