@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
 
+#include "analysis/allan/interval.hpp"
 #include "analysis/noise/ensemble.hpp"
 #include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -51,8 +51,7 @@ double upper_limit(const Study& study, const GyroStatistics& gyro) {
     for (const allan::Point& point : gyro.allan) {
         if (!known(point)) continue;
         const double seen = share_seen(study, point);
-        const double hi =
-            point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), doubt) / seen);
+        const double hi = point.dev / std::sqrt(allan::relative_chi_squared_quantile(point.edf, doubt) * seen);
         limit = std::min(limit, hi * std::sqrt(point.tau_s) * units::deg_rt_h_per_arcsec_rt_s);
     }
     return limit;
@@ -387,9 +386,12 @@ std::vector<EnsemblePoint> ensemble_points(const std::vector<std::vector<allan::
         if (std::isnan(point.edf)) {
             point.lo = point.hi = point.edf;
         } else {
-            const boost::math::chi_squared chi2(std::max(point.edf, 1e-3));
-            point.lo = point.dev_deg_h * std::sqrt(point.edf / quantile(chi2, 0.5 * (1.0 + confidence)));
-            point.hi = point.dev_deg_h * std::sqrt(point.edf / quantile(chi2, 0.5 * (1.0 - confidence)));
+            const auto end = [&](double p) {
+                const double edf = std::max(point.edf, 1e-3);
+                return point.dev_deg_h / std::sqrt(allan::relative_chi_squared_quantile(edf, p));
+            };
+            point.lo = end(0.5 * (1.0 + confidence));
+            point.hi = end(0.5 * (1.0 - confidence));
         }
         points.push_back(point);
     }

@@ -2,9 +2,11 @@
 
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
+#include "analysis/allan/interval.hpp"
 #include "analysis/allan/quadratic_form.hpp"
 #include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/uncertainty.hpp"
@@ -25,6 +27,19 @@ TEST(WeightedSquares, OfEqualWeightsAreChiSquared) {
         const boost::math::chi_squared chi2(k);
         for (const double p : {0.025, 0.1587, 0.5, 0.8413, 0.975}) {
             EXPECT_NEAR(boost::math::cdf(chi2, k * squares.quantile(p)), p, 1e-6) << k << " " << p;
+        }
+    }
+}
+
+// Damaged files declare any number of degrees of freedom: boost's series then ends with an error of its own.
+TEST(ChiSquaredQuantile, HoldsForAnyDegreesOfFreedom) {
+    for (const double p : {0.05, 0.16, 0.5, 0.84, 0.999}) {
+        for (const double edf : {1e5, 1e6, 1e7}) {
+            const double exact = boost::math::quantile(boost::math::chi_squared(edf), p) / edf;
+            EXPECT_NEAR(allan::relative_chi_squared_quantile(edf, p), exact, 1e-11) << edf << " " << p;
+        }
+        for (const double edf : {1e12, 1e18, 1e29, 1e31, 1e300, std::numeric_limits<double>::infinity()}) {
+            EXPECT_NEAR(allan::relative_chi_squared_quantile(edf, p), 1.0, 4.0 * std::sqrt(2.0 / edf)) << edf;
         }
     }
 }
