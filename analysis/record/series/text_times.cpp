@@ -52,6 +52,14 @@ void TextTimes::find_unit(const text::Layout& layout, const std::vector<std::str
         return;
     }
     if (where_.size() > 1) {
+        const text::Column& second = layout.columns[where_[1]];
+        const auto of_second = text::declared_time_unit(second.name, second.unit);
+        if (!unit_.iso && of_second && of_second->name != "ns") {
+            throw InputError(
+                fmt::format("{}:{}: column {} declares its times to be in {}; of two columns of times the second must "
+                            "hold nanoseconds or times of day. Where it is a time by itself, name it alone",
+                            file_, layout.line(), names_[1], of_second->name));
+        }
         if (unit_.name == "s" || unit_.iso) return;
         throw InputError(
             fmt::format("{}: --time-unit {}: the first of the two columns {} must hold seconds or dates, "
@@ -118,13 +126,6 @@ text::Stamp TextTimes::of_two(const text::Table& table) const {
         fail(table, 1, fmt::format("'{}' is not a number of nanoseconds", text::shown(second)));
     }
     const double value = nanoseconds.value();
-    if (value != std::nearbyint(value) && !std::isnan(value)) {
-        fail(table, 1,
-             fmt::format("is {}, no whole number of nanoseconds; of two columns of times the first must hold seconds "
-                         "or dates, the second nanoseconds or times of day. Where the second is a time by itself, name "
-                         "it alone",
-                         text::shown(second)));
-    }
     if (value < 0.0 || value >= in_a_second) {
         fail(table, 1,
              fmt::format("is {}; nanoseconds next to a column of seconds must be from 0 to 999999999",
