@@ -16,6 +16,11 @@ target_compile_options(ringlock_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -ffp-contract=off
   $<$<BOOL:${RINGLOCK_WERROR}>:-Werror>)
 
+# GCC looks through its whole memory for garbage each time it has grown by some share, precompiled headers included, and
+# finds little. Without that a source costs 3 to 10 % less time and up to a fifth more memory, 1.5 GB at most.
+target_compile_options(ringlock_options INTERFACE
+  $<$<COMPILE_LANG_AND_ID:CXX,GNU>:--param=ggc-min-heapsize=4194304>)
+
 # What the library is made of can be in a shared one only if its code does not depend on its place in memory.
 function(ringlock_part_of_library target)
   if(BUILD_SHARED_LIBS OR RINGLOCK_PYTHON)
