@@ -114,13 +114,13 @@ std::string normalised(std::string_view spelling) {
         if (word.empty()) return;
         for (const char* power : {"^-1", "-1"}) {
             if (word.size() > std::string_view(power).size() && word.ends_with(power)) {
-                word.resize(word.size() - std::string_view(power).size());
+                word.erase(word.size() - std::string_view(power).size());
                 divides = true;
             }
         }
         for (const char* power : {"^-2", "-2"}) {
             if (word.size() > std::string_view(power).size() && word.ends_with(power)) {
-                word.resize(word.size() - std::string_view(power).size());
+                word.erase(word.size() - std::string_view(power).size());
                 word = short_form(word) + "^2";
                 divides = true;
             }

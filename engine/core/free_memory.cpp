@@ -1,5 +1,6 @@
 #include "engine/core/free_memory.hpp"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -83,7 +84,7 @@ std::uint64_t left_in_control_groups(const fs::path& root) {
         const std::size_t first = line.find(':');
         const std::size_t second = line.find(':', first + 1);
         if (first == std::string::npos || second == std::string::npos) continue;
-        const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
+        const std::string controllers = fmt::format(",{},", line.substr(first + 1, second - first - 1));
         const fs::path group = line.substr(second + 1);
         const fs::path top = root / "sys/fs/cgroup";
         if (controllers == ",,") left = std::min(left, left_in_all(top, group, version_2));

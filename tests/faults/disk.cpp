@@ -29,8 +29,16 @@ class Disk : public test::ProgramTest {
    protected:
     void SetUp() override {
         ProgramTest::SetUp();
-        write("records.toml", "[ensemble]\ngyros = 70\nduration_s = 20.0\n");
-        write("statistics.toml", "[ensemble]\ngyros = 70\nduration_s = 20.0\n[output]\nangle_record = false\n");
+        make_studies("5");
+    }
+
+    /// Two studies and their results; with 20 s they run long enough to be interrupted.
+    void make_studies(const std::string& duration_s) {
+        const std::string ensemble = "[ensemble]\ngyros = 70\nduration_s = " + duration_s + "\n";
+        write("records.toml", ensemble);
+        write("statistics.toml", ensemble + "[output]\nangle_record = false\n");
+        fs::remove(directory_ / "records.h5");
+        fs::remove(directory_ / "statistics.h5");
         ASSERT_EQ(run({"run", "records.toml", "-o", "records.h5", "--checkpoint-every", "never"}).status, 0);
         ASSERT_EQ(run({"run", "statistics.toml", "-o", "statistics.h5", "--checkpoint-every", "never"}).status, 0);
     }
@@ -140,6 +148,7 @@ TEST_F(Disk, ThatIsReadOnlyIsToldBeforeTheRun) {
 }
 
 TEST_F(Disk, AFolderThatVanishesCostsNoMoreThanIsToldOf) {
+    make_studies("20");
     for (const char* const what : {"records", "statistics"}) {
         const pid_t child = start(command(what));
         const fs::path folder = directory_ / "out.h5.parts";
@@ -159,6 +168,7 @@ TEST_F(Disk, AFolderThatVanishesCostsNoMoreThanIsToldOf) {
 }
 
 TEST_F(Disk, AClockThatIsSetBackChangesNothing) {
+    make_studies("20");
     for (const char* const what : {"records", "statistics"}) {
         const Outcome r = run({"run", std::string(what) + ".toml", "-o", "out.h5", "--checkpoint-every", "0.05"}, [] {
             setenv("LD_PRELOAD", RINGLOCK_DISK_FAULTS, 1);
@@ -172,6 +182,7 @@ TEST_F(Disk, AClockThatIsSetBackChangesNothing) {
 // The thread that writes checkpoints has ended before the folder of a finished run is removed: here it would have time
 // to write the last blocks into the emptied folder.
 TEST_F(Disk, ThatRemovesSlowlyLeavesNoFolder) {
+    make_studies("20");
     for (const char* const what : {"records", "statistics"}) {
         const Outcome r = run({"run", std::string(what) + ".toml", "-o", "out.h5", "--checkpoint-every", "0.2"}, [] {
             setenv("LD_PRELOAD", RINGLOCK_DISK_FAULTS, 1);
@@ -183,6 +194,7 @@ TEST_F(Disk, ThatRemovesSlowlyLeavesNoFolder) {
 }
 
 TEST_F(Disk, PartsThatRotAreToldOfAndSimulatedAgain) {
+    make_studies("20");
     for (const char* const what : {"records", "statistics"}) {
         for (const bool cut : {false, true}) {
             const pid_t child = start(command(what));

@@ -123,7 +123,7 @@ int main(int argc, char** argv) {
         static const std::vector<std::string> columns = {"x", "x", "x", "x[:,0]", "x[0,:]", "t", "a_long_name"};
         if (!chance.one_in(4)) request.column = chance.of(columns);
         if (chance.one_in(6)) {
-            request.time = "t";
+            request.time = std::string("t");
             request.rate_hz = 100.0;
         }
         fuzz::attempt(

@@ -42,7 +42,7 @@ Spread spread(const std::vector<double>& v) {
 }
 
 TEST(AllanNoiseFit, WhiteRateNoiseGivesItsRandomWalkAndNothingElse) {
-    constexpr int records = 2000;
+    constexpr int records = 1000;
     constexpr std::size_t n = 600;
     int bias_claims = 0;
     int other_claims = 0;

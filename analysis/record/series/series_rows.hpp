@@ -29,7 +29,7 @@ using TakePiece = std::function<void(const SeriesPiece&)>;
 /// Takes the rows that a reader finds and hands them on in pieces of bounded length, with what is missing between.
 class SeriesRows {
    public:
-    explicit SeriesRows(TakePiece take) : take_(std::move(take)), values_(first), counts_(first) {}
+    explicit SeriesRows(TakePiece take) : take_(std::move(take)), values_(first_room), counts_(first_room) {}
 
     static constexpr std::size_t longest = 65536;  ///< values of a piece
 
@@ -105,7 +105,7 @@ class SeriesRows {
     void make_room();
     void flush();
 
-    static constexpr std::size_t first = 256;  ///< values that there is room for at the beginning
+    static constexpr std::size_t first_room = 256;  ///< values that there is room for at the beginning
 
     TakePiece take_;
     std::optional<TimeGrid> grid_;

@@ -51,7 +51,7 @@ TEST(ClosureAgainstEngine, TurnPhasesAgree) {
     std::vector<const char*> names;
     const auto add = [&](const char* name, auto change) {
         Truth truth;
-        truth.turns = 60;
+        truth.turns = 30;
         truth.initial_phase_rad = 1.3;
         truth.input_rate_deg_h = 15.0;
         truth.seed = truths.size();

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
@@ -100,8 +102,8 @@ void compare(const Closure& closure, std::optional<Where> where, const std::vect
     for (const Added& added : truth) true_effects.insert(added.effect);
     bool ties = false;
     for (const auto& step : closure.steps) {
-        outcome.named += (outcome.named.empty() ? "" : "+") + step.name();
-        for (const auto* other : step.confounded_with) outcome.named += "~" + std::string(other->name());
+        outcome.named += fmt::format("{}{}", outcome.named.empty() ? "" : "+", step.name());
+        for (const auto* other : step.confounded_with) outcome.named += fmt::format("~{}", other->name());
         const bool named = true_effects.contains(step.name());
         const bool tied_to_truth =
             std::any_of(step.confounded_with.begin(), step.confounded_with.end(),

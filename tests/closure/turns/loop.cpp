@@ -285,7 +285,7 @@ TEST(TurnLoop, RecordsThatCannotBeFollowedAreRefused) {
     truth.dither_frequency_hz = 450.0;
     truth.dither_peak_rate_deg_s = 50.0;
     truth.input_rate_deg_h = 100000.0;
-    truth.turns = 1000;
+    truth.turns = 400;
     const auto expect_refused = [&](const char* why) {
         EXPECT_THAT(
             [&] {
