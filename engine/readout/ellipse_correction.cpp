@@ -1,11 +1,12 @@
 #include "engine/readout/ellipse_correction.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/readout/ellipse_correction.cpp"
+#include "engine/core/dense.hpp"
 #include "engine/core/units.hpp"
 #include "engine/readout/readout_constants.hpp"
 #include "engine/simd/targets.hpp"
@@ -80,10 +81,12 @@ constexpr int made_up_readings = 8;
 constexpr double made_up_share = 1e-3;
 constexpr double least_eigenvalue = 1e-3;  // of the quadratic form, relative to 1; a form below it is no ellipse
 
-using Vector5 = Eigen::Matrix<double, 5, 1>;
-using Matrix5 = Eigen::Matrix<double, 5, 5>;
+constexpr int unknowns = 5;
 
-Vector5 powers_of(double s, double c) { return Vector5(s * s, s * c, c * c, s, c); }
+std::array<double, unknowns> powers_of(double s, double c) { return {s * s, s * c, c * c, s, c}; }
+
+/// Smaller eigenvalue of the form a x^2 + b x y + c y^2.
+double smaller_eigenvalue(double a, double b, double c) { return 0.5 * (a + c - std::hypot(a - c, b)); }
 
 }  // namespace
 
@@ -95,32 +98,34 @@ void EllipseCorrection::fit() {
     const double readings = memory_turns * -std::expm1(-static_cast<double>(turns_) / memory_turns);
     const double weight = 1.0 + made_up_share * readings / made_up_readings;
     for (std::size_t lane = 0; lane < lanes_; ++lane) {
-        Matrix5 normal;
-        Vector5 right;
+        Eigen::MatrixXd normal(unknowns, unknowns);
+        Eigen::VectorXd right(unknowns);
         std::size_t k = 0;
-        for (int row = 0; row < 5; ++row) {
-            for (int column = row; column < 5; ++column)
+        for (int row = 0; row < unknowns; ++row) {
+            for (int column = row; column < unknowns; ++column)
                 normal(row, column) = normal(column, row) = state_.sums[k++][lane];
         }
-        for (int row = 0; row < 5; ++row) right[row] = state_.sums[k++][lane];
+        for (int row = 0; row < unknowns; ++row) right[row] = state_.sums[k++][lane];
         for (int i = 0; i < made_up_readings; ++i) {
             const double psi = units::two_pi * i / made_up_readings;
-            const Vector5 powers = powers_of(std::sin(psi), std::cos(psi));
-            normal += weight * powers * powers.transpose();
-            right += weight * powers;
+            const auto powers = powers_of(std::sin(psi), std::cos(psi));
+            for (int row = 0; row < unknowns; ++row) {
+                const double weighted = weight * powers[row];
+                for (int column = 0; column < unknowns; ++column) normal(row, column) += weighted * powers[column];
+                right[row] += weighted;
+            }
         }
-        const Vector5 conic = normal.ldlt().solve(right);
-        Eigen::Matrix2d form;
-        form << conic[0], 0.5 * conic[1], 0.5 * conic[1], conic[2];
-        // A hyperbola, or no solution: the previous correction is kept.
-        if (!conic.allFinite() ||
-            Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(form).eigenvalues()[0] < least_eigenvalue) {
+        const Eigen::VectorXd conic = dense::solve_symmetric(normal, right);
+        // A hyperbola, or no solution (which makes the comparison false): the previous correction is kept.
+        if (!(smaller_eigenvalue(conic[0], conic[1], conic[2]) >= least_eigenvalue) || !std::isfinite(conic[3]) ||
+            !std::isfinite(conic[4])) {
             continue;
         }
-        const Eigen::Vector2d centre = -0.5 * form.inverse() * conic.tail<2>();
+        // Where the gradient of the quadratic form is minus the linear part.
+        const double determinant = 4.0 * conic[0] * conic[2] - conic[1] * conic[1];
         gyro::Ellipse& ellipse = known_[lane];
-        ellipse.offset_sin = centre[0];
-        ellipse.offset_cos = centre[1];
+        ellipse.offset_sin = (conic[1] * conic[4] - 2.0 * conic[2] * conic[3]) / determinant;
+        ellipse.offset_cos = (conic[1] * conic[3] - 2.0 * conic[0] * conic[4]) / determinant;
         ellipse.gain = std::sqrt(conic[2] / conic[0]) - 1.0;
         ellipse.orthogonality_rad = std::asin(0.5 * conic[1] / std::sqrt(conic[0] * conic[2]));
         const ComparatorPoints points = comparator_points(ellipse);

@@ -145,7 +145,7 @@ void against_extended_precision(int half_cycles, std::uint64_t seed) {
     EXPECT_LT(worst_table, 1e-10);
 }
 
-TEST(ReferenceIntegrators, ErrorsAgainstExtendedPrecision) { against_extended_precision(5, 41); }
+TEST(LongReferenceIntegrators, ErrorsAgainstExtendedPrecision) { against_extended_precision(5, 41); }
 TEST(LongReferenceIntegrators, ErrorsAgainstExtendedPrecisionOverSixtyHalfCycles) {
     against_extended_precision(60, 42);
 }

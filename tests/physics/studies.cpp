@@ -68,7 +68,7 @@ void expect_answer_of_gao_deng(double duration_s) {
 TEST(Scenarios, GaoDeng2007ShortensToItsAnswer) { expect_answer_of_gao_deng(60.0); }
 TEST(LongScenarios, GaoDeng2007) { expect_answer_of_gao_deng(600.0); }
 
-TEST(Scenarios, GaoDengTable1TurnsItsErrorsRound) {
+TEST(LongScenarios, GaoDengTable1TurnsItsErrorsRound) {
     scenario::Scenario scenario = from_file("gao-deng-2007-table1.toml");
     EXPECT_EQ(scenario.ensemble.duration_s, 60.0);
     EXPECT_EQ(scenario.readout.angle_output, scenario::AngleOutput::quarter_fringe);

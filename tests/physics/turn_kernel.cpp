@@ -265,7 +265,7 @@ TEST(TurnKernel, PiecesOfAnySizeGiveTheSameBits) {
     }
 }
 
-TEST(TurnKernel, LanesMatesAndInstructionSetsDoNotMatter) {
+TEST(LongTurnKernel, LanesMatesAndInstructionSetsDoNotMatter) {
     const std::size_t turns = 300;
     std::mt19937_64 random(407);
     for (const bool vary : {false, true}) {
@@ -354,7 +354,7 @@ TEST(TurnKernel, FollowsHalfCyclesSolvedOneByOne) {
     }
 }
 
-TEST(TurnKernel, FollowsStrongCouplingToo) {
+TEST(LongTurnKernel, FollowsStrongCouplingToo) {
     // A turn stretches a difference by up to (1 + |z|)/(1 - |z|) squared, a hundred times at |z| = 0.8, before the
     // next ones shrink it: two such turns in a row are worth 1e4 times 1e-10 rad.
     const std::size_t turns = 500;

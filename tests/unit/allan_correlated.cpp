@@ -69,7 +69,7 @@ TEST(AllanCorrelated, StandsBesideALine) {
 // Too weak to be claimed in four records of five, it pulls N by 5 %, twice N's error, where it is left out of the
 // model. In records of other seeds half of the intervals hold N beside it, without it a fifth to a quarter; standard
 // error of 150 records 4 %. What it feigns of flicker is claimed less often.
-TEST(AllanCorrelated, PullsNoOtherTermWhereItCannotBeExcluded) {
+TEST(LongAllanCorrelated, PullsNoOtherTermWhereItCannotBeExcluded) {
     constexpr int records = 150;
     const Truth truth{.n = 0.3, .correlated_rms = 0.1, .correlation_time_s = 30.0};
     const auto held = [&](const NoiseFit& f) {

@@ -151,7 +151,7 @@ TEST(AllanNoiseFit, StrongFlickerIsClaimedWithTheRightLevel) {
     EXPECT_NEAR(spread(estimates).mean, 1.0, 0.03);
 }
 
-TEST(AllanNoiseFit, RandomWalkAndRampAreToldApart) {
+TEST(LongAllanNoiseFit, RandomWalkAndRampAreToldApart) {
     constexpr int records = 200;
     const test::Truth walk{.n = 0.3, .k = 0.02};
     const test::Truth ramp{.n = 0.3, .r = 1e-4};
@@ -196,7 +196,7 @@ TEST(AllanNoiseFit, SamplingIntervalDoesNotChangeTheCoefficients) {
     }
 }
 
-TEST(AllanNoiseFit, FiveTermRecordsAreNotRejected) {
+TEST(LongAllanNoiseFit, FiveTermRecordsAreNotRejected) {
     constexpr int records = 300;
     const test::Truth truth{.q = 0.3, .n = 0.3, .b = 0.1, .k = 0.01, .r = 1e-4};
     int rejected = 0;

@@ -54,7 +54,7 @@ TEST(LongNoiseIdentification, ErrorsOfExponentsAreThoseOfTheirPoints) {
 
 // One kind of noise, 129, 65 and 33 points. Bounds are three standard errors (1 % or less) below what 5000 records of
 // other seeds show. An exponent by itself and with the octave below tells flicker in 88, 93 and 83 %.
-TEST(NoiseIdentification, FewPointsTellTheNoiseOfTheirRecord) {
+TEST(LongNoiseIdentification, FewPointsTellTheNoiseOfTheirRecord) {
     struct Case {
         test::Truth truth;
         int alpha;

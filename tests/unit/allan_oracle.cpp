@@ -51,7 +51,7 @@ std::vector<std::int64_t> some_factors(allan::Estimator e, std::int64_t points) 
 }
 
 // The counts are beyond 2^53, so that a double would have lost their last digits.
-TEST(AllanOracle, CountsAreExactInEveryEstimator) {
+TEST(LongAllanOracle, CountsAreExactInEveryEstimator) {
     constexpr std::size_t n = 401;
     const std::vector<std::int64_t> x = counts(n, 1);
     const allan::Phase phase = allan::phase_of(x, {}, allan::Kind::phase, 1.0, 1.0);

@@ -77,7 +77,7 @@ TEST(AllanPieces, TogetherTheyAreWhatTheyAreOneByOne) {
     }
 }
 
-TEST(AllanPieces, LongPiecesKeepTheirDigits) {
+TEST(LongAllanPieces, LongPiecesKeepTheirDigits) {
     for (const Series& s : all_series(15'011)) {
         for (const std::size_t m : {1000U, 2503U, 4990U}) {
             const double single = allan::sum_of_single_pieces(s.x, m).sum;

@@ -272,7 +272,7 @@ TEST(ClosureEffect, ReadoutEllipseIsOnTheDetectorsAlone) {
     EXPECT_EQ(with.record.turns->quarter_count, without.record.turns->quarter_count);
 }
 
-TEST(ClosureEffect, MissedCountsAreLostOnTheWay) {
+TEST(LongClosureEffect, MissedCountsAreLostOnTheWay) {
     Truth truth = usual();
     truth.turns = 400;
     const Generated without = one(truth);

@@ -87,7 +87,7 @@ TEST(LongClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
 }
 
 // A step and a ramp that both hold against every view, beside a random rate that does not and yet is likelier.
-TEST(ClosureSampleSuite, ARandomRateThatDoesNotHoldIsInNobodysWay) {
+TEST(LongClosureSampleSuite, ARandomRateThatDoesNotHoldIsInNobodysWay) {
     SampleCase of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = condition("warm"), .seed = 20442};
     of.truth = {{"bias_step", {{"step_deg_h", -4.1735}, {"time_s", 136.0}}}, {"bias_ramp", {{"deg_h_per_h", -86.258}}}};
     const Outcome outcome = judged(of);

@@ -104,7 +104,7 @@ TEST(ClosureSuite, AnswersAreJudgedStepByStep) {
     EXPECT_TRUE(wrong.false_name);
 }
 
-TEST(ClosureSuite, SizesComeFromTheRecordsInformation) {
+TEST(LongClosureSuite, SizesComeFromTheRecordsInformation) {
     // Information goes with the number of turns, and for a ramp with the fourth power of the time beside it.
     const auto limit = [](std::size_t count) {
         Case of{.kind = Kind::single, .truth = {}, .multiple = 1.0, .condition = &conditions[0], .seed = 340};
