@@ -17,7 +17,7 @@ target_compile_options(ringlock_options INTERFACE
   $<$<BOOL:${RINGLOCK_WERROR}>:-Werror>)
 
 # GCC looks through its whole memory for garbage each time it has grown by some share, precompiled headers included, and
-# finds little. Without that a source costs 3 to 10 % less time and up to a fifth more memory, 1.5 GB at most.
+# finds little. Without that a source costs a little less time and somewhat more memory.
 target_compile_options(ringlock_options INTERFACE
   $<$<COMPILE_LANG_AND_ID:CXX,GNU>:--param=ggc-min-heapsize=4194304>)
 
