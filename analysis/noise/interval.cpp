@@ -57,6 +57,18 @@ double where_risen(const Likelihood& likelihood, const Model& model, const Maxim
     return outside;
 }
 
+/// Whether another variance falls to 0, its bound, on the way to the end of a profile. The likelihood then falls
+/// because that one can give way no further, though the estimates of records in which it is truly 0 scatter as the
+/// curvature says.
+bool bounds_another(const Likelihood& likelihood, const Model& model, const Maximum& best, std::size_t parameter,
+                    double end) {
+    const Maximum there = likelihood.maximise(model, &best.theta, parameter, end);
+    for (std::size_t i = 0; i < term_count; ++i) {
+        if (i != parameter && best.theta[i] > 0.0 && !(there.theta[i] > 0.0)) return true;
+    }
+    return false;
+}
+
 }  // namespace
 
 Ends central_interval(const Likelihood& likelihood, const Model& model, const Maximum& best, std::size_t parameter) {
@@ -79,7 +91,10 @@ Ends central_interval(const Likelihood& likelihood, const Model& model, const Ma
         return value(where_risen(likelihood, model, best, parameter, quantile_deviance(degrees, p),
                                  direction * log_spread, 20.0, value));
     };
-    return {end(1.0 - normal_below, -1.0), end(normal_below, 1.0)};
+    Ends out{end(1.0 - normal_below, -1.0), end(normal_below, 1.0)};
+    const double of_curvature = value(log_spread);
+    if (out.hi < of_curvature && bounds_another(likelihood, model, best, parameter, out.hi)) out.hi = of_curvature;
+    return out;
 }
 
 std::optional<double> upper_limit(const Likelihood& likelihood, const Model& model, const Maximum& best,
