@@ -56,7 +56,7 @@ void undo_wraps(const Request& request, const Names& names, record::Series& seri
 
 bool is_event(const findings::Finding& found) {
     return found.kind == findings::Kind::outlier || found.kind == findings::Kind::jump ||
-           found.kind == findings::Kind::variance;
+           found.kind == findings::Kind::variance || found.kind == findings::Kind::repeated;
 }
 
 /// Searches the data, takes the findings from them and fits the rest. Where stretches are left out the rest is searched
@@ -85,7 +85,8 @@ class Cleaning {
 
    private:
     void search(AllanOutput& into) const {
-        search_and_fit(series_.values, phase_of(request_, series_, out_.tau0_s), request_.kind, request_.scale(), into);
+        search_and_fit(series_.values, series_.counts, phase_of(request_, series_, out_.tau0_s), request_.kind,
+                       request_.scale(), into);
     }
     void take_off(const std::vector<findings::Finding>& found) {
         const findings::Cleaned now = findings::clean(found, request_.kind, out_.tau0_s, series_.values);
@@ -95,7 +96,7 @@ class Cleaning {
         if (2 * cleaned_.left_out <= out_.n) return;
         throw InputError(
             fmt::format("{}: {} would leave out {} of {} data, more than half of them, because their noise differs "
-                        "from that of the others; analyse the parts of the record one by one",
+                        "from that of the others or they repeat one value; analyse the parts of the record one by one",
                         names_.series, names_.clean, cleaned_.left_out, out_.n));
     }
     void join(AllanOutput& rest) {
@@ -157,12 +158,15 @@ void evaluate(const Request& request, const Names& names, record::Series& series
     const allan::Phase phase = phase_of(request, series, out.tau0_s);
     check_size(names, request.kind, static_cast<std::int64_t>(phase.x.size()), out.n);
     std::vector<double> values = request.unit && !request.clean ? std::move(series.values) : std::vector<double>();
+    const std::vector<std::int64_t> counts = std::move(series.counts);
     series.values = {};
     series.counts = {};
     for (const allan::Estimator estimator : request.estimators) {
         out.deviations.push_back(deviation_of(request, names, phase, estimator, out.tau0_s));
     }
-    if (request.unit && !request.clean) search_and_fit(std::move(values), phase, request.kind, request.scale(), out);
+    if (request.unit && !request.clean) {
+        search_and_fit(std::move(values), counts, phase, request.kind, request.scale(), out);
+    }
     for (const findings::Finding& found : out.findings) {
         if (!series.lines.empty()) out.finding_lines.push_back(series.line_of(found.row).value_or(0));
     }

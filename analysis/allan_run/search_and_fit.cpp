@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
+#include <iterator>
+#include <string>
 #include <utility>
 
 #include "analysis/findings/clean_fit.hpp"
+#include "analysis/findings/cleaned.hpp"
+#include "analysis/findings/clipping.hpp"
 #include "analysis/findings/values.hpp"
 #include "analysis/noise/losses/fit.hpp"
 #include "analysis/noise/losses/lossy_rates.hpp"
@@ -38,16 +41,30 @@ struct Fitted {
     std::size_t first_row = 0;
 };
 
+/// Makes the data that only repeat the one before them missing; returns how many that are. None where they are more
+/// than half of all: there is no record without them.
+std::size_t leave_out_repeated(const std::vector<Finding>& found, allan::Kind kind, double tau0_s,
+                               std::vector<double>& values) {
+    std::vector<Finding> repeated;
+    std::copy_if(found.begin(), found.end(), std::back_inserter(repeated),
+                 [](const Finding& f) { return f.kind == findings::Kind::repeated; });
+    std::size_t held = 0;
+    for (const Finding& f : repeated) held += f.length - 1;
+    if (2 * held > values.size()) return 0;
+    return findings::clean(repeated, kind, tau0_s, values).left_out;
+}
+
 /// Of all data, or of the longest part without gaps where the record is too long or too empty for that.
-Fitted fit_of(const allan::Phase& phase, allan::Kind kind, AllanOutput& out) {
+/// \param held  data that are missing from the phase because they repeat a value
+Fitted fit_of(const allan::Phase& phase, allan::Kind kind, std::size_t held, AllanOutput& out) {
     const bool of_angles = kind == allan::Kind::phase;
     if (!phase.whole()) {
         noise::LossyRates rates = noise::lossy_rates(phase, out.tau0_s);
         if (noise::fitted_as_a_whole(rates)) {
             findings::CleanFit fit = findings::fit_without_events(std::move(rates), out.tau0_s, of_angles);
             if (!fit.given_up) {
-                out.noise_stretch = out.n;
-                out.noise_filled_in = out.missing;
+                out.noise_stretch = out.n - held;
+                out.noise_filled_in = out.missing + held;
                 return {std::move(fit), 0};
             }
         }
@@ -60,28 +77,40 @@ Fitted fit_of(const allan::Phase& phase, allan::Kind kind, AllanOutput& out) {
 
 }  // namespace
 
-void search_and_fit(std::vector<double> values, const allan::Phase& phase, allan::Kind kind, double scale,
-                    AllanOutput& out) {
-    for (const Finding& found : findings::search_values(values)) out.findings.push_back(found);
+void search_and_fit(std::vector<double> values, std::span<const std::int64_t> counts, const allan::Phase& phase,
+                    allan::Kind kind, double scale, AllanOutput& out) {
+    const std::vector<Finding> of_values = findings::search_values(values);
+    out.findings.insert(out.findings.end(), of_values.begin(), of_values.end());
+    const std::size_t held = leave_out_repeated(of_values, kind, out.tau0_s, values);
+    const std::string clipped = findings::why_clipping_withholds(of_values, kind, values);
     const allan::Phase* clean = &phase;
-    allan::Phase unwrapped;
+    allan::Phase changed;
+    if (held > 0) {
+        changed = counts.empty() ? allan::phase_of(values, kind, out.tau0_s, scale)
+                                 : allan::phase_of(counts, values, kind, out.tau0_s, scale);
+        clean = &changed;
+    }
     if (const auto wraps = findings::find_wraps(values)) {
         for (const std::size_t at : wraps->at) {
             out.findings.push_back({.kind = findings::Kind::wrap, .row = at, .size = wraps->modulus});
         }
         findings::unwrap(*wraps, values);
-        unwrapped = allan::phase_of(values, kind, out.tau0_s, scale);
-        clean = &unwrapped;
+        changed = allan::phase_of(values, kind, out.tau0_s, scale);
+        clean = &changed;
     }
     // A phase begins with the first value that is there.
     const auto there = std::find_if(values.begin(), values.end(), [](double v) { return !std::isnan(v); });
     const auto lead = static_cast<std::size_t>(there - values.begin());
     values = {};
-    Fitted fitted = fit_of(*clean, kind, out);
+    Fitted fitted = fit_of(*clean, kind, held, out);
     const auto shown = [&](const Finding& found) {
         return in_data(found, lead + fitted.first_row, kind, scale, out.tau0_s);
     };
     out.noise = std::move(fitted.fit.noise);
+    if (out.noise->described && !clipped.empty()) {
+        out.noise->described = false;
+        out.noise->reason = clipped;
+    }
     for (const Finding& found : fitted.fit.searched.findings) out.findings.push_back(shown(found));
     if (fitted.fit.instead_of_walk) out.jump_instead_of_walk = shown(*fitted.fit.instead_of_walk);
     std::stable_sort(out.findings.begin(), out.findings.end(),

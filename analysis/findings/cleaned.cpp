@@ -9,6 +9,12 @@ namespace ringlock::findings {
 Cleaned clean(std::span<const Finding> findings, allan::Kind kind, double tau0_s, std::span<double> values) {
     Cleaned out;
     const auto rows_from = [&](const Finding& found) { return values.subspan(std::min(found.row, values.size())); };
+    const auto leave_out = [&](std::span<double> rows, std::size_t length) {
+        for (double& value : rows.first(std::min(length, rows.size()))) {
+            out.left_out += std::isnan(value) ? 0 : 1;
+            value = std::numeric_limits<double>::quiet_NaN();
+        }
+    };
     for (const Finding& found : findings) {
         switch (found.kind) {
             case Kind::outlier:
@@ -30,14 +36,15 @@ Cleaned clean(std::span<const Finding> findings, allan::Kind kind, double tau0_s
                 break;
             }
             case Kind::variance:
-                for (double& value : rows_from(found).first(std::min(found.length, rows_from(found).size()))) {
-                    out.left_out += std::isnan(value) ? 0 : 1;
-                    value = std::numeric_limits<double>::quiet_NaN();
-                }
+                leave_out(rows_from(found), found.length);
+                break;
+            case Kind::repeated:
+                // The first one is a value of its own.
+                if (found.length > 1) leave_out(rows_from(found).subspan(1), found.length - 1);
                 break;
             case Kind::wrap:
-            case Kind::repeated:
             case Kind::clipped:
+            case Kind::gap:
                 break;
         }
     }

@@ -10,13 +10,13 @@ namespace ringlock::findings {
 
 /// How many data a cleaned series is without.
 struct Cleaned {
-    std::size_t left_out = 0;   ///< data that are missing now: those of stretches of another variance
+    std::size_t left_out = 0;   ///< data that are missing now: of stretches of another variance, or that repeat a value
     std::size_t corrected = 0;  ///< outliers, each less its estimated size
     std::size_t jumps = 0;      ///< steps taken off all data behind them
 };
 
-/// Takes the findings from the data: outliers and jumps by their estimated sizes, stretches of another variance by
-/// making their data missing (NaN). Wraps, repeated and clipped values stay.
+/// Takes the findings from the data: outliers and jumps by their estimated sizes, stretches of another variance and
+/// values that repeat the one before them by making these data missing (NaN). Wraps and clipped values stay.
 /// \param findings  rows and sizes of the data themselves; jumps of the rate of a phase in its unit a second
 /// \param values    the data, NaN where missing; changed in place
 Cleaned clean(std::span<const Finding> findings, allan::Kind kind, double tau0_s, std::span<double> values);

@@ -1,5 +1,9 @@
 #include "analysis/findings/finding.hpp"
 
+#include <algorithm>
+#include <array>
+#include <numeric>
+
 namespace ringlock::findings {
 
 const char* name_of(Kind kind) {
@@ -15,9 +19,41 @@ const char* name_of(Kind kind) {
         case Kind::repeated:
             return "repeated";
         case Kind::clipped:
+            return "clipped";
+        case Kind::gap:
             break;
     }
-    return "clipped";
+    return "gap";
+}
+
+std::vector<std::size_t> listed(std::span<const Finding> found) {
+    std::vector<std::size_t> places(found.size());
+    std::iota(places.begin(), places.end(), std::size_t{0});
+    std::stable_partition(places.begin(), places.end(), [&](std::size_t i) { return found[i].kind != Kind::gap; });
+    return places;
+}
+
+std::string estimated_without(std::span<const Finding> found) {
+    struct Named {
+        Kind kind;
+        const char* plural;
+    };
+    constexpr std::array<Named, 4> named = {{{Kind::outlier, "outliers"},
+                                             {Kind::jump, "jumps"},
+                                             {Kind::wrap, "wraps"},
+                                             {Kind::repeated, "repeated values"}}};
+    std::vector<std::string> names;
+    for (const Named& of : named) {
+        if (std::any_of(found.begin(), found.end(), [&](const Finding& f) { return f.kind == of.kind; })) {
+            names.emplace_back(of.plural);
+        }
+    }
+    std::string text;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (i > 0) text += i + 1 < names.size() ? ", " : " and ";
+        text += names[i];
+    }
+    return text;
 }
 
 }  // namespace ringlock::findings

@@ -8,7 +8,8 @@
 namespace ringlock::findings {
 
 /// Values that repeat for longer than chance allows at the step of the data, and values that pile up at either end of
-/// their range. Missing values (NaN) end a run.
+/// their range. Missing values (NaN) end a run; runs of them are gaps, all of which are given, or where a record has
+/// more than a hundred those that are longer than losses at random explain.
 std::vector<Finding> search_values(std::span<const double> values);
 
 /// A counter or an angle that starts again from the other end of its range.

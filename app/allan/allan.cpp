@@ -142,7 +142,8 @@ void add_allan(CLI::App& root) {
            "an angle; off undoes those that are found for the coefficients alone")
         ->capture_default_str();
     sub->add_flag("--clean", a->clean,
-                  "Take outliers, jumps and wraps from the deviations too, and leave disturbed stretches out");
+                  "Take outliers, jumps and wraps from the deviations too, and leave disturbed stretches and repeated "
+                  "values out");
     sub->add_flag("--stream", a->stream, "Keep no record: octaves of oadev and ohdev in little memory");
     add_output_options(*sub, *a);
     sub->add_flag("--json", a->json, "One JSON object on standard output");

@@ -82,7 +82,9 @@ Table findings_table(const AllanOutput& out) {
                  {"rows", Align::right},
                  {"size", Align::right},
                  {"in standard errors", Align::right}});
-    for (std::size_t i = 0; i < std::min(most_findings, out.findings.size()); ++i) {
+    std::vector<std::size_t> shown = findings::listed(out.findings);
+    shown.resize(std::min(most_findings, shown.size()));
+    for (const std::size_t i : shown) {
         const findings::Finding& found = out.findings[i];
         const std::string kind = found.kind == findings::Kind::jump
                                      ? fmt::format("jump of the {}", found.of_angle ? "angle" : "rate")
@@ -98,7 +100,8 @@ Table findings_table(const AllanOutput& out) {
 
 void add_findings_of(report::Page& page, const AllanOutput& out) {
     if (out.findings.empty()) {
-        page.paragraph("The search for outliers, jumps, wraps and disturbed stretches found nothing.");
+        page.paragraph(
+            "The search for outliers, jumps, wraps, disturbed stretches and repeated or clipped values found nothing.");
         return;
     }
     page.table(findings_table(out), "Found in the data, rows counted from 1");
@@ -111,13 +114,13 @@ void add_findings_of(report::Page& page, const AllanOutput& out) {
     if (out.cleaned) {
         page.paragraph(
             fmt::format("Deviations and coefficients are of the data without {} outliers and {} jumps, which are taken "
-                        "off by their "
-                        "sizes, and without {} data of disturbed stretches.",
+                        "off by their sizes, and without {} data of disturbed stretches and of runs of one value.",
                         out.cleaned->corrected, out.cleaned->jumps, out.cleaned->left_out));
     } else {
+        const std::string without = findings::estimated_without(out.findings);
         page.paragraph(
-            "The deviations are of the data as they are; coefficients are of the data without outliers, jumps "
-            "and wraps.");
+            fmt::format("The deviations are of the data as they are{}.",
+                        without.empty() ? "" : fmt::format("; coefficients are of the data without {}", without)));
     }
 }
 

@@ -400,7 +400,7 @@ def allan(
     confidence: level of the intervals of the deviations
     bias:       "published", "exact" or "raw" (docs/allan.md)
     wrap:       "off", "auto" or a modulus: undo wraps of a counter or an angle
-    clean:      take outliers and jumps off, and leave disturbed stretches out
+    clean:      take outliers and jumps off, and leave disturbed stretches and repeated values out
     arw_unit:   also the random walk in this unit, "deg/h/sqrt(Hz)"
     column:     name of the series (or, of several, their names)
 

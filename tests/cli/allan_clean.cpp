@@ -128,6 +128,41 @@ TEST_F(AllanClean, DisturbedStretchesAreLeftOut) {
     EXPECT_NEAR(n, 1.0 / 60.0, 0.05 / 60.0);
 }
 
+TEST_F(AllanClean, RepeatedValuesAreLeftOut) {
+    std::vector<double> rate = white(4000, 5);
+    std::fill_n(rate.begin() + 1000, 100, rate[1000]);
+    write_values("held.txt", rate);
+    const Arguments options = {"held.txt", "--rate", "1", "--kind", "rate", "--unit", "deg/h"};
+    const auto plain = json_of(options);
+    ASSERT_EQ(plain["findings"].size(), 1U);
+    EXPECT_EQ(plain["findings"][0]["kind"], "repeated");
+    EXPECT_EQ(plain["n"], 4000);
+    EXPECT_EQ(plain["noise_fitted_points"], 3901);
+    EXPECT_EQ(plain["noise_filled_in"], 99);
+    Arguments with_clean = options;
+    with_clean.emplace_back("--clean");
+    const auto cleaned = json_of(with_clean);
+    EXPECT_EQ(cleaned["n"], 3901);
+    EXPECT_EQ(cleaned["cleaned"]["left_out"], 99);
+    EXPECT_EQ(cleaned["noise"], plain["noise"]);
+    EXPECT_GT(cleaned["deviations"]["oadev"][0]["dev"].get<double>(),
+              plain["deviations"]["oadev"][0]["dev"].get<double>());
+    Arguments text = options;
+    text.insert(text.begin(), "allan");
+    EXPECT_THAT(run(text).out,
+                AllOf(HasSubstr("without repeated values"), HasSubstr("repeat a value are allowed for")));
+}
+
+TEST_F(AllanClean, ClippedNoiseHasNoCoefficients) {
+    std::vector<double> rate = white(4000, 6);
+    for (double& v : rate) v = std::clamp(v, -2.0, 2.0);
+    write_values("clipped.txt", rate);
+    const auto clipped = json_of({"clipped.txt", "--rate", "1", "--kind", "rate", "--unit", "deg/h"});
+    ASSERT_EQ(clipped["findings"].size(), 2U);
+    EXPECT_EQ(clipped["findings"][0]["kind"], "clipped");
+    EXPECT_THAT(clipped["noise_withheld"].get<std::string>(), HasSubstr("ends of their range"));
+}
+
 TEST_F(AllanClean, NeedsAUnitAndARecordThatIsKept) {
     write_values("data.txt", white(100, 4));
     const test::Outcome without_unit = run({"allan", "data.txt", "--rate", "1", "--kind", "rate", "--clean"});

@@ -284,8 +284,12 @@ TEST_F(Library, AllanGivesTheJsonOfTheProgram) {
     options.unit = "deg/h";
     options.deviations = {"oadev", "mdev", "mtie"};
     const ringlock::Allan analysis = ringlock::allan(rates, options);
-    EXPECT_EQ(analysis.to_json() + "\n",
-              program("allan data.txt --rate 50 --kind rate --unit deg/h --dev oadev,mdev,mtie --json"));
+    // Values have no lines as those of a file have, in which the missing one is a finding.
+    std::string of_program = program("allan data.txt --rate 50 --kind rate --unit deg/h --dev oadev,mdev,mtie --json");
+    const std::string line = "\"line\":101,";
+    ASSERT_NE(of_program.find(line), std::string::npos) << of_program;
+    of_program.replace(of_program.find(line), line.size(), "\"line\":null,");
+    EXPECT_EQ(analysis.to_json() + "\n", of_program);
     EXPECT_EQ(analysis.n, 1999U);
     EXPECT_EQ(analysis.missing, 1U);
     EXPECT_TRUE(std::isnan(analysis.deviation("mtie").points.front().lo));

@@ -59,8 +59,34 @@ TEST(FoundValues, AClippedOutputPilesUp) {
 
 TEST(FoundValues, MissingValuesEndARun) {
     std::vector<double> values(200, std::numeric_limits<double>::quiet_NaN());
-    EXPECT_TRUE(search_values(values).empty());
+    const auto found = search_values(values);
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].kind, Kind::gap);
+    EXPECT_EQ(found[0].length, 200U);
     EXPECT_FALSE(find_wraps(values));
+}
+
+TEST(FoundValues, FewGapsAreAllGivenOfManyTheLongOnes) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    std::vector<double> values = noise_of(5000, 3);
+    values[17] = nan;
+    std::fill_n(values.begin() + 3000, 60, nan);
+    auto found = search_values(values);
+    ASSERT_EQ(found.size(), 2U);
+    EXPECT_EQ(found[0].row, 17U);
+    EXPECT_EQ(found[0].length, 1U);
+    EXPECT_EQ(found[1].row, 3000U);
+    EXPECT_EQ(found[1].length, 60U);
+    std::mt19937_64 random(4);
+    for (double& v : values) {
+        if (random() % 3 == 0) v = nan;
+    }
+    values[2999] = values[3060] = 0.0;
+    found = search_values(values);
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].kind, Kind::gap);
+    EXPECT_EQ(found[0].row, 3000U);
+    EXPECT_EQ(found[0].length, 60U);
 }
 
 // Counters of 16 bits with and without a sign, angles in degrees: every wrap is undone.

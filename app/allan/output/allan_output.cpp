@@ -71,6 +71,9 @@ std::string finding_line(const findings::Finding& found, const AllanOutput& out,
             return fmt::format("{} by {:.10g} {}\n", row, found.size, out.input_unit);
         case findings::Kind::repeated:
             return fmt::format("{} {} times {:.6g}\n", row, found.length, found.size);
+        case findings::Kind::gap:
+            return fmt::format("{} of {} data from {:.6g} s on\n", row, found.length,
+                               static_cast<double>(found.row) * out.tau0_s);
         case findings::Kind::clipped:
             break;
     }
@@ -82,20 +85,22 @@ std::string findings_text(const AllanOutput& out) {
     if (out.findings.empty()) return "";
     constexpr std::size_t most = 20;
     std::string text = "\nFound in the data (rows counted from 1; missing data count):\n";
-    for (std::size_t i = 0; i < std::min(most, out.findings.size()); ++i) {
-        text += finding_line(out.findings[i], out, allan_run::line_of(out, i));
-    }
+    std::vector<std::size_t> shown = findings::listed(out.findings);
+    shown.resize(std::min(most, shown.size()));
+    for (const std::size_t i : shown) text += finding_line(out.findings[i], out, allan_run::line_of(out, i));
     if (out.findings.size() > most) text += fmt::format("  and {} more\n", out.findings.size() - most);
     if (out.cleaned) {
-        return text + fmt::format(
-                          "Deviations and coefficients are of the data without {} outliers and {} jumps, which are "
-                          "taken off by their sizes, and without {} data of disturbed stretches.\n",
-                          out.cleaned->corrected, out.cleaned->jumps, out.cleaned->left_out);
+        return text +
+               fmt::format(
+                   "Deviations and coefficients are of the data without {} outliers and {} jumps, which are "
+                   "taken off by their sizes, and without {} data of disturbed stretches and of runs of one value.\n",
+                   out.cleaned->corrected, out.cleaned->jumps, out.cleaned->left_out);
     }
-    const bool estimated = out.noise && out.noise->described;
+    const std::string without = findings::estimated_without(out.findings);
+    const bool estimated = out.noise && out.noise->described && !without.empty();
     text += fmt::format("The deviations are of the data as they are{}{}.\n",
                         out.wraps_undone > 0 ? fmt::format(" with {} wraps undone", out.wraps_undone) : "",
-                        estimated ? ", the coefficients of them without outliers, jumps and wraps" : "");
+                        estimated ? fmt::format(", the coefficients of them without {}", without) : "");
     return text;
 }
 
@@ -104,8 +109,9 @@ std::string noise_text(const AllanOutput& out) {
     const InstrumentNames& names = names_of(*out.instrument);
     std::string text;
     if (out.noise_filled_in) {
-        text += fmt::format("\nCoefficients from all {} data; the {} that are missing are allowed for.\n",
-                            *out.noise_stretch, *out.noise_filled_in);
+        const bool repeated = *out.noise_filled_in > out.missing;
+        text += fmt::format("\nCoefficients from all {} data; the {} that are missing{} are allowed for.\n",
+                            *out.noise_stretch, *out.noise_filled_in, repeated ? " or repeat a value" : "");
     } else if (out.noise_stretch) {
         text += fmt::format(
             "\nCoefficients from the longest part without gaps, {} points: a record with gaps is not fitted as a whole "

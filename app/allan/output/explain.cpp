@@ -223,10 +223,10 @@ std::vector<std::string> explanation(const AllanOutput& out) {
         return sentences;
     }
     if (!out.findings.empty()) {
-        sentences.push_back(
-            fmt::format("{} fault{} found in the data; outliers, jumps and wraps were taken off before the "
-                        "coefficients were estimated.",
-                        out.findings.size(), out.findings.size() == 1 ? " was" : "s were"));
+        const std::string without = findings::estimated_without(out.findings);
+        sentences.push_back(fmt::format(
+            "{} fault{} found in the data{}.", out.findings.size(), out.findings.size() == 1 ? " was" : "s were",
+            without.empty() ? "" : fmt::format("; the coefficients are estimated without {}", without)));
     }
     const std::vector<double> tau_s = averaging_times(out);
     const auto terms = noise::variance_terms(*out.noise, tau_s);

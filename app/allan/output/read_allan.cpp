@@ -40,7 +40,8 @@ quantity::Instrument instrument_named(const std::string& name) {
 
 findings::Kind kind_named(const std::string& name) {
     using findings::Kind;
-    for (const Kind kind : {Kind::outlier, Kind::jump, Kind::variance, Kind::wrap, Kind::repeated, Kind::clipped}) {
+    for (const Kind kind :
+         {Kind::outlier, Kind::jump, Kind::variance, Kind::wrap, Kind::repeated, Kind::clipped, Kind::gap}) {
         if (findings::name_of(kind) == name) return kind;
     }
     throw InputError(fmt::format("findings: \"{}\" is no kind of finding that this program knows", printable(name)));

@@ -35,7 +35,7 @@ struct AllanOptions {
     double confidence = 0.682689492137;  ///< two-sided level of the intervals of deviations
     Bias bias = Bias::published;
     std::string wrap = "off";   ///< "off", "auto" or a modulus such as "2^16": undo wraps of a counter or an angle
-    bool clean = false;         ///< take outliers, jumps and wraps off, and leave disturbed stretches out
+    bool clean = false;         ///< take outliers, jumps and wraps off, and leave disturbed stretches and repeats out
     std::string arw_unit = {};  ///< also the random walk in this unit, such as "deg/h/sqrt(Hz)"
     std::string column = "1";   ///< name of the series in messages and in to_json()
 };
