@@ -58,20 +58,27 @@ std::size_t leave_out_repeated(const std::vector<Finding>& found, allan::Kind ki
 /// \param held  data that are missing from the phase because they repeat a value
 Fitted fit_of(const allan::Phase& phase, allan::Kind kind, std::size_t held, AllanOutput& out) {
     const bool of_angles = kind == allan::Kind::phase;
+    const auto of_all_data = [&] {
+        out.noise_stretch = out.n - held;
+        out.noise_filled_in = out.missing + held;
+    };
     if (!phase.whole()) {
         noise::LossyRates rates = noise::lossy_rates(phase, out.tau0_s);
         if (noise::fitted_as_a_whole(rates)) {
             findings::CleanFit fit = findings::fit_without_events(std::move(rates), out.tau0_s, of_angles);
             if (!fit.given_up) {
-                out.noise_stretch = out.n - held;
-                out.noise_filled_in = out.missing + held;
+                of_all_data();
                 return {std::move(fit), 0};
             }
         }
     }
     const allan::Stretch& stretch = longest_of(phase);
     const std::span<const double> angle = std::span(phase.x).subspan(stretch.begin, stretch.size());
-    if (!phase.whole()) out.noise_stretch = stretch.size();
+    if (!phase.whole()) {
+        out.noise_stretch = stretch.size();
+    } else if (held > 0) {
+        of_all_data();  // the repeats are at an end of the record
+    }
     return {findings::fit_without_events(angle, out.tau0_s, of_angles), stretch.begin};
 }
 

@@ -122,6 +122,28 @@ TEST_P(HeldValues, CountAsMissing) {
     EXPECT_GE(right, 2);
 }
 
+TEST_P(HeldValues, AtTheEndOfTheRecordCountAsMissing) {
+    std::vector<double> values = white(1600, 60);
+    if (GetParam() == Kind::phase) {
+        for (std::size_t i = 1; i < values.size(); ++i) values[i] += values[i - 1] + 2.0;
+    }
+    std::fill(values.begin() + 1201, values.end(), values[1200]);
+    const auto out = analysed(values, GetParam());
+    ASSERT_TRUE(out.noise->described) << out.noise->reason;
+    EXPECT_EQ(out.noise_stretch, 1201U);
+    EXPECT_EQ(out.noise_filled_in, 399U);
+    EXPECT_NEAR(*out.noise->arw_deg_rt_h.value, truth_deg_rt_h, 0.07 * truth_deg_rt_h);
+}
+
+// Where most of the record is one value, the rest is no record: it is not fitted by itself.
+TEST_P(HeldValues, AreKeptWhereTheyAreMostOfTheRecord) {
+    std::vector<double> values = white(1600, 61);
+    std::fill(values.begin() + 400, values.end(), values[400]);
+    const auto out = analysed(values, GetParam());
+    EXPECT_FALSE(out.noise->described && out.noise->arw_deg_rt_h.resolved);
+    EXPECT_FALSE(out.noise_filled_in);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, HeldValues, testing::Values(Kind::phase, Kind::increment, Kind::rate));
 
 }  // namespace
