@@ -54,8 +54,10 @@ std::string why_clipping_withholds(std::span<const Finding> found, allan::Kind k
         if (2 * there < f.length) continue;  // most of them repeat a value and are left out
         if (clipped == 0) middle = middle_of(values);
         clipped += there;
-        hidden += share_clipped_off(std::abs(f.size - middle.value) / middle.deviation);
+        // Where half of the data are at one end there is no deviation to compare it with.
+        hidden += middle.deviation > 0.0 ? share_clipped_off(std::abs(f.size - middle.value) / middle.deviation) : 1.0;
     }
+    hidden = std::min(1.0, hidden);
     if (clipped == 0) return "";
     if (kind == allan::Kind::phase) return fmt::format("{} data lie at the ends of their range", clipped);
     // A coefficient grows as the root of its variance.

@@ -184,15 +184,7 @@ void print(const Study& study) {
     for (const NoiseFit& f : all) withheld += f.described ? 0 : 1;
     bool first = true;
     for (std::size_t i = 0; i < names.size(); ++i) {
-        if (!(study.truth.*names[i].truth > 0.0)) {
-            int claims = 0;
-            for (const NoiseFit& f : all) claims += (f.*names[i].member).resolved ? 1 : 0;
-            if (claims > 0) {
-                row({"", names[i].name, fmt::format("{:.1f} %", 100.0 * claims / records), "absent", "", "", "", "",
-                     ""});
-            }
-            continue;
-        }
+        if (!(study.truth.*names[i].truth > 0.0)) continue;
         const Tally mine = tally_of(all, names[i], study.truth);
         const Tally whole = tally_of(as_many, names[i], study.truth);
         row({first ? study.name : "", names[i].name, fmt::format("{:.1f} %", 100.0 * mine.claimed / records),
@@ -202,6 +194,14 @@ void print(const Study& study) {
              number(mine.width / mine.claimed / mine.spread(), 3),
              first ? fmt::format("{:.1f} %", 100.0 * withheld / records) : ""});
         first = false;
+    }
+    for (const Named& name : names) {
+        if (study.truth.*name.truth > 0.0) continue;
+        const auto claims =
+            std::count_if(all.begin(), all.end(), [&](const NoiseFit& f) { return (f.*name.member).resolved; });
+        if (claims == 0) continue;
+        const double percent = 100.0 * static_cast<double>(claims) / records;
+        row({"", name.name, fmt::format("{:.1f} %", percent), "absent", "", "", "", "", "", "", ""});
     }
 }
 

@@ -91,6 +91,14 @@ TEST(FindingsInValues, SpikesThatSaturateAreNoClippedNoise) {
     EXPECT_NEAR(*out.noise->arw_deg_rt_h.value, truth_deg_rt_h, 0.04 * truth_deg_rt_h);
 }
 
+TEST(FindingsInValues, NoiseMostOfWhichIsClippedHasNoCoefficients) {
+    std::vector<double> values = white(2000, 8);
+    for (double& v : values) v = std::max(v, 0.8);
+    const auto out = analysed(values, Kind::rate);
+    EXPECT_FALSE(out.noise->described);
+    EXPECT_EQ(out.noise->reason.find("nan"), std::string::npos) << out.noise->reason;
+}
+
 // An angle that is at the end of its range has no distribution to be compared with.
 TEST(FindingsInValues, ClippedAnglesHaveNoCoefficients) {
     std::vector<double> angle = white(4000, 6);
