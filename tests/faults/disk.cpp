@@ -29,12 +29,12 @@ class Disk : public test::ProgramTest {
    protected:
     void SetUp() override {
         ProgramTest::SetUp();
-        make_studies("5");
+        make_studies("5", "[arms]\nnames = [\"uncompensated\"]\n");
     }
 
-    /// Two studies and their results; with 20 s they run long enough to be interrupted.
-    void make_studies(const std::string& duration_s) {
-        const std::string ensemble = "[ensemble]\ngyros = 70\nduration_s = " + duration_s + "\n";
+    /// Two studies and their results; with 20 s of the usual arms they run long enough to be interrupted.
+    void make_studies(const std::string& duration_s, const std::string& arms = "") {
+        const std::string ensemble = arms + "[ensemble]\ngyros = 70\nduration_s = " + duration_s + "\n";
         write("records.toml", ensemble);
         write("statistics.toml", ensemble + "[output]\nangle_record = false\n");
         fs::remove(directory_ / "records.h5");
