@@ -110,7 +110,7 @@ void add_findings_of(report::Page& page, const AllanOutput& out) {
     }
     page.paragraph(
         "The size is in the unit of the data; of a disturbed stretch it is the ratio of its variance to that of the "
-        "rest.");
+        "rest, of a gap the number of missing data.");
     if (out.cleaned) {
         page.paragraph(
             fmt::format("Deviations and coefficients are of the data without {} outliers and {} jumps, which are taken "
