@@ -114,9 +114,9 @@ void search_and_fit(std::vector<double> values, std::span<const std::int64_t> co
         return in_data(found, lead + fitted.first_row, kind, scale, out.tau0_s);
     };
     out.noise = std::move(fitted.fit.noise);
-    if (out.noise->described && !clipped.empty()) {
+    if (!clipped.empty()) {
+        out.noise->reason = out.noise->described ? clipped : clipped + "; " + out.noise->reason;
         out.noise->described = false;
-        out.noise->reason = clipped;
     }
     for (const Finding& found : fitted.fit.searched.findings) out.findings.push_back(shown(found));
     if (fitted.fit.instead_of_walk) out.jump_instead_of_walk = shown(*fitted.fit.instead_of_walk);

@@ -63,7 +63,7 @@ std::string why_clipping_withholds(std::span<const Finding> found, allan::Kind k
     // A coefficient grows as the root of its variance.
     const double error = 1.0 / std::sqrt(2.0 * static_cast<double>(middle.count));
     if (0.5 * hidden <= of_error * error) return "";
-    return fmt::format("{} data lie at the ends of their range, which hides about {:.2g} % of the variance", clipped,
+    return fmt::format("{} data lie at the ends of their range, which hides about {:.3g} % of the variance", clipped,
                        100.0 * hidden);
 }
 

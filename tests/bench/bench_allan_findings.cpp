@@ -8,13 +8,16 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
+#include <algorithm>
 #include <boost/random/uniform_real_distribution.hpp>
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <string>
 #include <vector>
 
+#include "analysis/allan_run/search_and_fit.hpp"
 #include "analysis/findings/clean_fit.hpp"
 #include "analysis/findings/values.hpp"
 #include "tests/bench/page.hpp"
@@ -171,14 +174,15 @@ struct Faulty {
     CleanFit fit;
 };
 
-void print_by_size(const std::vector<Faulty>& faulty, const std::vector<double>& bounds) {
+void print_by_size(const std::vector<Faulty>& faulty, const std::vector<double>& bounds,
+                   const std::string& unit = "sigma") {
     Tally pooled;
     for (std::size_t i = 0; i + 1 < bounds.size(); ++i) {
         Tally tally;
         for (const Faulty& one : faulty) {
             if (one.size >= bounds[i] && one.size < bounds[i + 1]) tally.add(one.fit, one.found);
         }
-        tally.print(fmt::format("{} to {} sigma", number(bounds[i]), number(bounds[i + 1])));
+        tally.print(fmt::format("{} to {} {}", number(bounds[i]), number(bounds[i + 1]), unit));
     }
     for (const Faulty& one : faulty) pooled.add(one.fit, one.found);
     pooled.print("all");
@@ -258,6 +262,44 @@ void wraps() {
     tally.print("modulus 2^10 to 2^19");
 }
 
+/// The analysis of the data themselves, in which values are searched for before their noise.
+CleanFit analysed(const std::vector<double>& rate) {
+    allan_run::AllanOutput out;
+    out.tau0_s = tau0_s;
+    out.n = rate.size();
+    allan_run::search_and_fit(rate, {}, allan::phase_of(rate, allan::Kind::rate, tau0_s), allan::Kind::rate, 1.0, out);
+    return {{.findings = out.findings, .rate = {}}, *out.noise, {}};
+}
+
+void held() {
+    head_of_faults("an output that is held, samples");
+    const auto faulty = of_records<Faulty>([](std::size_t k) {
+        Engine engine = engine_of(k, 24);
+        std::vector<double> rate = white_rates(24000000 + k);
+        const double length = std::floor(log_uniform(engine, 10.0, 500.0));
+        const auto at = static_cast<std::size_t>(uniform(engine, 0.0, samples - length));
+        std::fill_n(rate.begin() + static_cast<std::ptrdiff_t>(at), static_cast<std::size_t>(length), rate[at]);
+        const CleanFit fit = analysed(rate);
+        return Faulty{length, has(fit, findings::Kind::repeated), fit};
+    });
+    print_by_size(faulty, {10.0, 20.0, 50.0, 150.0, 500.0}, "samples");
+}
+
+void clipped() {
+    head_of_faults("an output that is clipped");
+    const auto faulty = of_records<Faulty>([](std::size_t k) {
+        Engine engine = engine_of(k, 25);
+        std::vector<double> rate = white_rates(25000000 + k);
+        const double limit = uniform(engine, 1.5, 4.0);
+        const double mean = std::accumulate(rate.begin(), rate.end(), 0.0) / static_cast<double>(samples);
+        const double lower = uniform(engine, 0.0, 1.0) < 0.5 ? mean - limit : -1e9;
+        for (double& r : rate) r = std::clamp(r, lower, mean + limit);
+        const CleanFit fit = analysed(rate);
+        return Faulty{limit, has(fit, findings::Kind::clipped), fit};
+    });
+    print_by_size(faulty, {1.5, 2.0, 2.5, 3.0, 3.5, 4.0});
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -269,7 +311,7 @@ int main(int argc, char** argv) {
             wanted = argv[i];
         }
     }
-    const std::vector<bench::Block> blocks = {
-        {"clean", clean}, {"glitches", glitches}, {"jumps", jumps}, {"wraps", wraps}};
+    const std::vector<bench::Block> blocks = {{"clean", clean}, {"glitches", glitches}, {"jumps", jumps},
+                                              {"wraps", wraps}, {"held", held},         {"clipped", clipped}};
     return bench::print_blocks("bench_allan_findings", wanted, blocks);
 }
