@@ -1,8 +1,13 @@
 #include "analysis/findings/cleaned.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
+
+#include "analysis/findings/words.hpp"
 
 namespace ringlock::findings {
 
@@ -49,6 +54,18 @@ Cleaned clean(std::span<const Finding> findings, allan::Kind kind, double tau0_s
         }
     }
     return out;
+}
+
+std::string data_of(const Cleaned& cleaned) {
+    std::vector<std::string> parts;
+    const auto add = [&](std::size_t count, const char* one, const char* many) {
+        if (count > 0) parts.push_back(fmt::format("{} {}", count, count == 1 ? one : many));
+    };
+    add(cleaned.corrected, "outlier", "outliers");
+    add(cleaned.jumps, "jump", "jumps");
+    constexpr const char* left_out = "data of disturbed stretches or of runs of one value";
+    add(cleaned.left_out, left_out, left_out);
+    return parts.empty() ? "all data" : fmt::format("the data without {}", in_words(parts));
 }
 
 }  // namespace ringlock::findings

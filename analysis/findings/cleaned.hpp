@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "analysis/allan/sums/phase.hpp"
@@ -20,5 +21,9 @@ struct Cleaned {
 /// \param findings  rows and sizes of the data themselves; jumps of the rate of a phase in its unit a second
 /// \param values    the data, NaN where missing; changed in place
 Cleaned clean(std::span<const Finding> findings, allan::Kind kind, double tau0_s, std::span<double> values);
+
+/// What a cleaned series is without, as "all data" or "the data without 2 outliers, 1 jump and 99 data of disturbed
+/// stretches or of runs of one value".
+std::string data_of(const Cleaned& cleaned);
 
 }  // namespace ringlock::findings

@@ -4,6 +4,8 @@
 #include <array>
 #include <numeric>
 
+#include "analysis/findings/words.hpp"
+
 namespace ringlock::findings {
 
 const char* name_of(Kind kind) {
@@ -48,12 +50,7 @@ std::string estimated_without(std::span<const Finding> found) {
             names.emplace_back(of.plural);
         }
     }
-    std::string text;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-        if (i > 0) text += i + 1 < names.size() ? ", " : " and ";
-        text += names[i];
-    }
-    return text;
+    return in_words(names);
 }
 
 }  // namespace ringlock::findings

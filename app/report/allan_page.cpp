@@ -112,15 +112,12 @@ void add_findings_of(report::Page& page, const AllanOutput& out) {
         "The size is in the unit of the data; of a disturbed stretch it is the ratio of its variance to that of the "
         "rest, of a gap the number of missing data.");
     if (out.cleaned) {
-        page.paragraph(
-            fmt::format("Deviations and coefficients are of the data without {} outliers and {} jumps, which are taken "
-                        "off by their sizes, and without {} data of disturbed stretches and of runs of one value.",
-                        out.cleaned->corrected, out.cleaned->jumps, out.cleaned->left_out));
+        page.paragraph(fmt::format("Deviations and coefficients are of {}.", findings::data_of(*out.cleaned)));
     } else {
         const std::string without = findings::estimated_without(out.findings);
-        page.paragraph(
-            fmt::format("The deviations are of the data as they are{}.",
-                        without.empty() ? "" : fmt::format("; coefficients are of the data without {}", without)));
+        const bool estimated = out.noise && out.noise->described && !without.empty();
+        page.paragraph(fmt::format("The deviations are of the data as they are{}.",
+                                   estimated ? fmt::format("; coefficients are of the data without {}", without) : ""));
     }
 }
 

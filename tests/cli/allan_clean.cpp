@@ -118,8 +118,13 @@ TEST_F(AllanClean, DisturbedStretchesAreLeftOut) {
     write_values("data.txt", rate);
     const auto plain = json_of({"data.txt", "--rate", "1", "--kind", "rate", "--unit", "deg/h"});
     EXPECT_FALSE(plain["noise_withheld"].is_null());
+    EXPECT_THAT(run({"allan", "data.txt", "--rate", "1", "--kind", "rate", "--unit", "deg/h"}).out,
+                HasSubstr("--clean analyses the rest without these stretches"));
     const auto cleaned = json_of({"data.txt", "--rate", "1", "--kind", "rate", "--unit", "deg/h", "--clean"});
     EXPECT_TRUE(cleaned["noise_withheld"].is_null()) << cleaned["noise_withheld"];
+    EXPECT_THAT(run({"allan", "data.txt", "--rate", "1", "--kind", "rate", "--unit", "deg/h", "--clean"}).out,
+                AllOf(HasSubstr("are of the data without "), HasSubstr(" data of disturbed stretches"),
+                      HasSubstr("missing or left out are allowed for")));
     const std::size_t left_out = cleaned["cleaned"]["left_out"];
     EXPECT_GE(left_out, 370U);  // windows overlap by half of their length
     EXPECT_LE(left_out, 700U);

@@ -5,9 +5,13 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/allan_run/search_and_fit.hpp"
+#include "analysis/findings/cleaned.hpp"
 #include "analysis/findings/clipping.hpp"
 
 namespace findings_in_values_test {
@@ -106,6 +110,21 @@ TEST(FindingsInValues, ClippedAnglesHaveNoCoefficients) {
     const auto out = analysed(angle, Kind::phase);
     EXPECT_FALSE(out.noise->described);
     EXPECT_NE(out.noise->reason.find("ends of their range"), std::string::npos) << out.noise->reason;
+}
+
+TEST(FindingsInValues, WhatWasTakenOffIsSaidInWords) {
+    EXPECT_EQ(findings::data_of({}), "all data");
+    EXPECT_EQ(findings::data_of({.left_out = 0, .corrected = 1, .jumps = 0}), "the data without 1 outlier");
+    EXPECT_EQ(findings::data_of({.left_out = 99, .corrected = 2, .jumps = 1}),
+              "the data without 2 outliers, 1 jump and 99 data of disturbed stretches or of runs of one value");
+    const std::vector<findings::Finding> found = {{.kind = findings::Kind::gap},
+                                                  {.kind = findings::Kind::repeated},
+                                                  {.kind = findings::Kind::jump},
+                                                  {.kind = findings::Kind::clipped},
+                                                  {.kind = findings::Kind::outlier}};
+    EXPECT_EQ(findings::estimated_without(found), "outliers, jumps and repeated values");
+    EXPECT_EQ(findings::estimated_without(std::span(found).first(1)), "");
+    EXPECT_EQ(findings::listed(found), (std::vector<std::size_t>{1, 2, 3, 4, 0}));
 }
 
 class HeldValues : public testing::TestWithParam<Kind> {};

@@ -90,11 +90,7 @@ std::string findings_text(const AllanOutput& out) {
     for (const std::size_t i : shown) text += finding_line(out.findings[i], out, allan_run::line_of(out, i));
     if (out.findings.size() > most) text += fmt::format("  and {} more\n", out.findings.size() - most);
     if (out.cleaned) {
-        return text +
-               fmt::format(
-                   "Deviations and coefficients are of the data without {} outliers and {} jumps, which are "
-                   "taken off by their sizes, and without {} data of disturbed stretches and of runs of one value.\n",
-                   out.cleaned->corrected, out.cleaned->jumps, out.cleaned->left_out);
+        return text + fmt::format("Deviations and coefficients are of {}.\n", findings::data_of(*out.cleaned));
     }
     const std::string without = findings::estimated_without(out.findings);
     const bool estimated = out.noise && out.noise->described && !without.empty();
@@ -109,9 +105,12 @@ std::string noise_text(const AllanOutput& out) {
     const InstrumentNames& names = names_of(*out.instrument);
     std::string text;
     if (out.noise_filled_in) {
-        const bool repeated = *out.noise_filled_in > out.missing;
-        text += fmt::format("\nCoefficients from all {} data; the {} that are missing{} are allowed for.\n",
-                            *out.noise_stretch, *out.noise_filled_in, repeated ? " or repeat a value" : "");
+        if (out.noise->described) {
+            const char* others = "";
+            if (*out.noise_filled_in > out.missing) others = out.cleaned ? " or left out" : " or repeat a value";
+            text += fmt::format("\nCoefficients from all {} data; the {} that are missing{} are allowed for.\n",
+                                *out.noise_stretch, *out.noise_filled_in, others);
+        }
     } else if (out.noise_stretch) {
         text += fmt::format(
             "\nCoefficients from the longest part without gaps, {} points: a record with gaps is not fitted as a whole "
@@ -122,10 +121,14 @@ std::string noise_text(const AllanOutput& out) {
         text += fmt::format("\nCoefficients from every {}th point, which was kept.\n", *out.noise_thinning);
     }
     if (!out.noise->described) {
+        const bool stretches = std::any_of(out.findings.begin(), out.findings.end(), [](const findings::Finding& f) {
+            return f.kind == findings::Kind::variance;
+        });
         return text + fmt::format(
                           "\nNoise coefficients withheld: {}.\nQ, N, B, K and R would not describe this record; find "
-                          "and remove the cause before quoting any.\n",
-                          out.noise->reason);
+                          "and remove the cause before quoting any.\n{}",
+                          out.noise->reason,
+                          stretches && !out.cleaned ? "--clean analyses the rest without these stretches.\n" : "");
     }
     text += fmt::format("\nNoise coefficients of the {} (68.27 % interval; limits 95 %)\n", names.name);
     for (const CoefficientName& name : names.coefficients) {
