@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/allan_run/run.hpp"
 #include "analysis/allan_run/search_and_fit.hpp"
 #include "analysis/findings/cleaned.hpp"
 #include "analysis/findings/clipping.hpp"
@@ -171,7 +172,8 @@ TEST_P(HeldValues, AreKeptWhereTheyAreMostOfTheRecord) {
     EXPECT_FALSE(out.noise_filled_in);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, HeldValues, testing::Values(Kind::phase, Kind::increment, Kind::rate));
+INSTANTIATE_TEST_SUITE_P(Kinds, HeldValues, testing::Values(Kind::phase, Kind::increment, Kind::rate),
+                         [](const auto& tested) { return std::string(allan_run::name_of(tested.param)); });
 
 }  // namespace
 }  // namespace findings_in_values_test
