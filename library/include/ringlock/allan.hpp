@@ -72,11 +72,11 @@ struct NoiseCoefficient {
 
 /// A fault of the data that no noise model has.
 struct Finding {
-    std::string kind;         ///< outlier, jump, variance, wrap, repeated, clipped
+    std::string kind;         ///< outlier, jump, variance, wrap, repeated, clipped, gap
     std::size_t row = 0;      ///< first datum, counted from 0, missing ones included
     std::size_t rows = 1;     ///< data that are affected
-    double size = 0.0;        ///< unit of the data; ratio of variances; modulus of a wrap
-    double size_sigma = 0.0;  ///< over its standard error; NaN for wraps
+    double size = 0.0;        ///< unit of the data; ratio of variances; modulus of a wrap; data in a gap
+    double size_sigma = 0.0;  ///< over its standard error; NaN for wraps and gaps
 };
 
 /// The analysis of a series.
