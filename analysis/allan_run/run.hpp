@@ -25,7 +25,7 @@ struct Request {
     TauChoice taus;
     allan::Options options;  ///< confidence and bias
     WrapChoice wrap;
-    bool clean = false;  ///< deviations, too, are of the data without the findings
+    bool clean = false;  ///< deviations, too, are of the data without the faults that can be taken off
 
     double scale() const { return unit ? unit->factor : 1.0; }
 };

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include "analysis/findings/median.hpp"
@@ -20,15 +22,13 @@ struct Middle {
 };
 
 Middle middle_of(std::span<const double> values) {
-    constexpr double normal = 1.4826;  // standard deviation of a normal distribution over its median deviation
     std::vector<double> present;
     std::copy_if(values.begin(), values.end(), std::back_inserter(present), [](double v) { return !std::isnan(v); });
     Middle out;
     out.count = present.size();
     if (present.empty()) return out;
     out.value = median_of(present);
-    for (double& v : present) v = std::abs(v - out.value);
-    out.deviation = normal * median_of(present);
+    out.deviation = normal_deviation(std::move(present), out.value);
     return out;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
 
 #include "analysis/findings/median.hpp"
 #include "engine/core/error.hpp"
@@ -171,7 +172,6 @@ struct Steps {
 };
 
 Steps steps_of(std::span<const double> values) {
-    constexpr double normal = 1.4826;  // standard deviation of a normal distribution over its median size
     Steps out;
     std::vector<double> steps;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -183,9 +183,7 @@ Steps steps_of(std::span<const double> values) {
     out.count = steps.size();
     if (steps.empty()) return out;
     out.usual = median_of(steps);
-    std::vector<double> off;
-    for (const double step : steps) off.push_back(std::abs(step - out.usual));
-    out.spread = std::max(normal * median_of(off), 1e-12 * (out.high - out.low));
+    out.spread = std::max(normal_deviation(std::move(steps), out.usual), 1e-12 * (out.high - out.low));
     return out;
 }
 

@@ -217,8 +217,7 @@ std::vector<std::string> explanation(const AllanOutput& out) {
     }
     if (!out.noise->described) {
         sentences.push_back(
-            fmt::format("No noise coefficient is given: {}. The five terms, correlated noise and sinusoids do not "
-                        "describe the record, so that each value would be wrong by more than its interval.",
+            fmt::format("No noise coefficient is given: {}. Each value would be wrong by more than its interval.",
                         out.noise->reason));
         return sentences;
     }
